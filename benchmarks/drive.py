@@ -15,7 +15,7 @@ from cogmap.cli.launch.forking.client import fork_server
 from cogmap.cli.launch.metrics import RunMetrics
 from cogmap.cli.launch.observer import Errors, Observer
 from cogmap.cli.launch.outcome import Outcome
-from cogmap.cli.launch.plan import LOG_NAME, Choices, awaited, effective
+from cogmap.cli.launch.plan import LOG_NAME, Choices, effective
 from cogmap.cli.launch.watch import Watch
 from cogmap.cli.run import summary
 from cogmap.cli.run.display import Display, display_on
@@ -88,8 +88,7 @@ def drive(
 
     with fork_server() as server:
         choices = Choices(laps=laps)
-        members = awaited(choices, observer=True)
-        sections = effective(settings or {}, choices, members)
+        sections = effective(settings or {}, choices, observer=True)
         run = Drive(folder, free_endpoint(), "agent", choices, sections, began_s, server)
         try:
             watch, ending = run.run(began_s + TIMEOUT_S, stop, stop)

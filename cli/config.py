@@ -11,7 +11,7 @@ import click
 import msgspec
 import tomli_w
 
-from cogmap.cli.launch.plan import Choices, awaited, effective
+from cogmap.cli.launch.plan import Choices, effective
 from cogmap.cli.options import config_option, json_option, set_option
 from cogmap.cli.run.command import codelets_option, laps_option, lockstep_option, seed_option
 from cogmap.errors import UsageError
@@ -61,7 +61,7 @@ def print_config(
 
     choices = Choices(seed=seed, laps=laps, lockstep=lockstep, codelets=codelets, record=record)
     given = config.load(config_path, settings)
-    sections = effective(given, choices, awaited(choices, observer=False))
+    sections = effective(given, choices, observer=False)
     if schema:
         output.write(json.dumps(file_schema(), indent=2) + "\n")
     elif as_json:

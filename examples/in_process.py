@@ -11,7 +11,7 @@ from examples import wanderer
 def drive(frames: int) -> list[TruePose]:
     """The robot's true poses while the wanderer answers that many frames, in lockstep."""
     poses: list[TruePose] = []
-    sections = {"sim": {"mode": "lockstep", "egl": False}}
+    sections = {"run": {"lockstep": True}, "sim": {"egl": False}}
     runner = InProcessRunner(
         [
             registry.build("sim", sections),

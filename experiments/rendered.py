@@ -36,7 +36,7 @@ def with_cameras(sections: Sections) -> Sections:
     sim.pop("percepts", None)
     sim["trajectory"]["sensing"] = "cameras"
     sim["trajectory"]["landmarks"] = named(sim["trajectory"]["landmarks"])
-    sim["awaits"] |= dict.fromkeys(SENSES, 1)
+    changed["run"]["participants"] |= dict.fromkeys(SENSES, 1)
 
     noise = sim["noise"]
     changed["sensory"] = {

@@ -8,160 +8,52 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
 from importlib.util import find_spec
-from typing import TYPE_CHECKING
+from inspect import signature
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import msgspec
 
 from cogmap.errors import UsageError
-from cogmap.runtime import config
+from cogmap.runtime import config, run
 
 if TYPE_CHECKING:
-    from cogmap.runtime.codelet import Codelet
+    from cogmap.runtime.codelet import Codelet, ConfiguredCodelet
     from cogmap.runtime.module import Module
 
-    Build = Callable[[config.Sections, str], Module]
+
+class Entry(NamedTuple):
+    """The import strings of a module's type of configuration, and of the function that builds it.
+
+    That function takes what it needs by name: `config`, its section; `instance`, its name; `run`,
+    the facts of the run; `codelets`, the configured codelets.
+    """
+
+    config: str
+    build: str
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A module's type of configuration, and how it is built from all sections and its instance."""
+MODULES = (
+    "sim",
+    "sensory",
+    "epam",
+    "workspace",
+    "codelets",
+    "global_workspace",
+    "memory",
+    "procedural",
+    "action",
+    "motor",
+)
 
-    config: type[msgspec.Struct]
-    build: Build
-
-
-def _sim() -> Entry:
-    from cogmap.services.sim.config import Config
-
-    def built(sections: config.Sections, name: str) -> Module:
-        from cogmap.services.sim.module import build
-
-        return build(config.typed(sections, "sim", Config), name)
-
-    return Entry(Config, built)
-
-
-def _sensory() -> Entry:
-    from cogmap.services.sensory.config import Config
-
-    def built(sections: config.Sections, name: str) -> Module:
-        from cogmap.services.sensory.module import build
-
-        return build(config.typed(sections, "sensory", Config), name)
-
-    return Entry(Config, built)
-
-
-def _epam() -> Entry:
-    from cogmap.services.epam.config import Config
-
-    def built(sections: config.Sections, name: str) -> Module:
-        from cogmap.services.epam.module import build
-
-        return build(config.typed(sections, "epam", Config), name)
-
-    return Entry(Config, built)
-
-
-def _workspace() -> Entry:
-    from cogmap.services.workspace.config import Config
-
-    def built(sections: config.Sections, name: str) -> Module:
-        from cogmap.services.codelets.table import all_codelets, configured
-        from cogmap.services.workspace.module import build
-
-        codelets = configured(sections, all_codelets())
-        return build(config.typed(sections, "workspace", Config), name, codelets)
-
-    return Entry(Config, built)
-
-
-def _codelets() -> Entry:
-    from cogmap.services.codelets.config import Config
-
-    def built(sections: config.Sections, name: str) -> Module:
-        from cogmap.services.codelets.module import build
-        from cogmap.services.codelets.table import all_codelets, configured
-
-        return build(name, configured(sections, all_codelets()))
-
-    return Entry(Config, built)
-
-
-def _global_workspace() -> Entry:
-    from cogmap.services.global_workspace.config import Config
-
-    def built(sections: config.Sections, name: str) -> Module:
-        from cogmap.services.global_workspace.module import build
-
-        return build(config.typed(sections, "global_workspace", Config), name)
-
-    return Entry(Config, built)
-
-
-def _memory() -> Entry:
-    from cogmap.services.memory.config import Config
-
-    def built(sections: config.Sections, name: str) -> Module:
-        from cogmap.services.memory.module import build
-
-        return build(config.typed(sections, "memory", Config), name)
-
-    return Entry(Config, built)
-
-
-def _procedural() -> Entry:
-    from cogmap.services.procedural.config import Config
-
-    def built(sections: config.Sections, name: str) -> Module:
-        from cogmap.services.procedural.module import build
-
-        return build(config.typed(sections, "procedural", Config), name)
-
-    return Entry(Config, built)
-
-
-def _action() -> Entry:
-    from cogmap.services.action.config import Config
-
-    def built(sections: config.Sections, name: str) -> Module:
-        from cogmap.services.action.module import build
-
-        return build(config.typed(sections, "action", Config), name)
-
-    return Entry(Config, built)
-
-
-def _motor() -> Entry:
-    from cogmap.services.motor.config import Config
-
-    def built(sections: config.Sections, name: str) -> Module:
-        from cogmap.services.motor.module import build
-
-        return build(config.typed(sections, "motor", Config), name)
-
-    return Entry(Config, built)
-
-
-_ENTRIES: dict[str, Callable[[], Entry]] = {
-    "sim": _sim,
-    "sensory": _sensory,
-    "epam": _epam,
-    "workspace": _workspace,
-    "codelets": _codelets,
-    "global_workspace": _global_workspace,
-    "memory": _memory,
-    "procedural": _procedural,
-    "action": _action,
-    "motor": _motor,
+ENTRIES = {
+    name: Entry(f"cogmap.services.{name}.config:Config", f"cogmap.services.{name}.module:build")
+    for name in MODULES
 }
-
-MODULES = tuple(_ENTRIES)
 
 _OF_CODELETS = (
     "scipy.ndimage",
@@ -198,12 +90,16 @@ def _settings_found_on(path: tuple[str, ...]) -> dict[str, type[msgspec.Struct]]
 
 
 def config_type(name: str) -> type[msgspec.Struct]:
-    """The configuration struct of a section: a module's, or that of another package's codelet.
+    """The configuration struct of a section: the run's, a module's, or that of another package's
+    codelet.
 
     Raises UsageError naming the modules there are.
     """
-    if name in _ENTRIES:
-        return _ENTRIES[name]().config
+    if name == run.SECTION:
+        return run.Run
+    if name in ENTRIES:
+        kind: type[msgspec.Struct] = resolve_name(ENTRIES[name].config)
+        return kind
     found = _settings_of_codelets().get(name)
     if found is not None:
         return found
@@ -211,9 +107,9 @@ def config_type(name: str) -> type[msgspec.Struct]:
 
 
 def sections() -> tuple[str, ...]:
-    """The sections that a configuration may have: modules, and codelets of other packages."""
+    """The sections that a configuration may have: the run, modules, and codelets of others."""
     others = _settings_of_codelets().keys() - set(MODULES)
-    return (*MODULES, *sorted(others))
+    return (run.SECTION, *MODULES, *sorted(others))
 
 
 def runs_codelets(name: str) -> bool:
@@ -240,14 +136,29 @@ def prepare(name: str) -> Iterator[None]:
             import_module(part)
             yield
 
-    import_module(f"cogmap.services.{name}.module")
+    resolve_name(ENTRIES[name].build)
     yield
 
 
 def build(name: str, settings: config.Sections, instance: str = "") -> Module:
     """Module `name`, configured from its section. Raises UsageError, ConfigError."""
-    if not settings.keys() <= _ENTRIES.keys():
+    if not settings.keys() <= {run.SECTION, *MODULES}:
         config.check_sections(settings, sections())
-    if name not in _ENTRIES:
+    if name not in ENTRIES:
         raise UsageError(f"no module {name!r}: there are {', '.join(MODULES)}")
-    return _ENTRIES[name]().build(settings, instance or name)
+
+    def configured_codelets() -> tuple[ConfiguredCodelet, ...]:
+        from cogmap.services.codelets.table import configured
+
+        return configured(settings, codelets())
+
+    available: dict[str, Callable[[], Any]] = {
+        "config": lambda: config.typed(settings, name, config_type(name)),
+        "instance": lambda: instance or name,
+        "run": lambda: config.typed(settings, run.SECTION, run.Run),
+        "codelets": configured_codelets,
+    }
+    make = resolve_name(ENTRIES[name].build)
+    arguments = {parameter: available[parameter]() for parameter in signature(make).parameters}
+    module: Module = make(**arguments)
+    return module

@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from benchmarks.explore.measure import mind, sections
+from benchmarks.harness import agent_modules, build, running, town_sections
 from cogmap.cli.launch.tally import EnergyTally
-from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
-from cogmap.schemas.sensing import Energy
-from cogmap.services import registry
 
-MOTOR = "motor"
 CAPACITY_S = 500.0
 """How long a full battery lasts at rest: for less than a life, so that to stand still is no way to
 live.
@@ -35,42 +31,29 @@ class Life:
         return self.lowest <= 0.0
 
 
-class _Observer:
-    def __init__(self) -> None:
-        self.tally = EnergyTally()
-        self.now_s = 0.0
-
-    def on_energy(self, energy: Energy) -> None:
-        self.tally.update(energy)
-        self.now_s = energy.stamp_ns / 1e9
-
-
 def live(
-    seed: int, longest_s: float, *, has_cameras: bool = False, acting: Module | None = None
+    seed: int, max_s: float, *, has_cameras: bool = False, acting: Module | None = None
 ) -> Life:
-    """Explore the town of a seed with a battery that runs down, until it is empty or `longest_s`
+    """Explore the town of a seed with a battery that runs down, until it is empty or `max_s`
     are over; `acting` selects actions in the place of the module `action`.
     """
-    configured = sections(seed, has_cameras)
-    configured["sim"] = configured["sim"] | {
-        "energy": True,
+    configured = town_sections(seed, has_cameras)
+    configured["sim"] |= {
         "battery": {"capacity_s": CAPACITY_S},
-        "duration_s": longest_s,
+        "duration_s": max_s,
     }
-    configured["workspace"] |= {"awaits_energy": True, "offering": [MOTOR]}
-    configured[MOTOR] |= {"makes_offers": True}
+    configured["run"] |= {"energy": True}
 
-    observer = _Observer()
-    watching = Module("observer").on(topics.ENERGY, observer.on_energy)
-    modules = [registry.build(name, configured) for name in ("sim", *mind(has_cameras))]
+    modules = build(("sim", *agent_modules(has_cameras)), configured)
     if acting is not None:
         modules = [acting if module.name == acting.name else module for module in modules]
 
-    with InProcessRunner([*modules, watching]) as runner:
-        runner.run(lambda: observer.tally.is_out or observer.now_s >= longest_s)
+    tally = EnergyTally()
 
-    return Life(
-        lived_s=observer.now_s,
-        lowest=observer.tally.lowest,
-        charged=observer.tally.charged,
-    )
+    def lived_s() -> float:
+        return tally.newest.stamp_ns / 1e9 if tally.newest is not None else 0.0
+
+    with running([*modules, Module("observer").on(topics.ENERGY, tally.update)]) as runner:
+        runner.run(lambda: tally.is_out or lived_s() >= max_s)
+
+    return Life(lived_s=lived_s(), lowest=tally.lowest, charged=tally.charged)

@@ -5,35 +5,24 @@ them also with cameras.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import click
-import msgspec
 import numpy as np
 
 from benchmarks.benchmark import PROCESSES, Setting
 from benchmarks.explore.boundaries import BoundaryScore
 from benchmarks.explore.experimenter import Experimenter
 from benchmarks.explore.trials import Trial
+from benchmarks.harness import agent_modules, build, running, town_sections
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
 from cogmap.cli.log.progress import bar
-from cogmap.errors import CogmapError
 from cogmap.parallel import parallel_map
-from cogmap.runtime.config import Sections
-from cogmap.runtime.in_process import InProcessRunner
-from cogmap.services import registry
-from cogmap.services.sim.odometry import FUSED
 
 TOWNS = 10
 FIRST_SEED = 101
 EXPLORE_S = 900.0
 GOALS = 10
-LONGEST_S = 6000.0
-# A plan of these towns takes some 20 ms, a tenth of a cycle.
-PLANNING_CYCLES = 1
-COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
-SENSES = ("sensory", "epam")
 THRESHOLDS = {
     "explored_share": at_least(0.9),
     "goals_reached_share": at_least(0.98),
@@ -75,51 +64,15 @@ class Town:
     collisions: int
 
 
-def sections(seed: int, has_cameras: bool = False) -> Sections:
-    """A town of several blocks, a robot that explores, in lockstep; percept-level sensing unless it
-    has cameras.
-    """
-    sim: dict[str, Any] = {
-        "seed": seed,
-        "mode": "lockstep",
-        "town": "blocks",
-        "sensing": "cameras" if has_cameras else "percepts",
-        "duration_s": LONGEST_S,
-        "awaits": dict.fromkeys(mind(has_cameras), 1),
-    }
-    if not has_cameras:
-        sim["noise"] = msgspec.to_builtins(FUSED)
-
-    return {
-        "sim": sim,
-        "workspace": {"mode": "lockstep", "background_cycles": PLANNING_CYCLES},
-        "procedural": {"mode": "lockstep"},
-        "motor": {"mode": "lockstep"},
-        "epam": {"mode": "lockstep"},
-        "planning": {"explore": True},
-    }
-
-
-def mind(has_cameras: bool) -> tuple[str, ...]:
-    """The modules that the simulator waits for."""
-    if has_cameras:
-        return (*SENSES, *COGNITION)
-    return COGNITION
-
-
 def visit(chosen: Visit) -> Town:
     """Explore one town, then drive to goals in it. Raises CogmapError where a module rejected a
     message.
     """
-    configured = sections(chosen.seed, chosen.has_cameras)
+    configured = town_sections(chosen.seed, chosen.has_cameras)
     experimenter = Experimenter(chosen.seed, chosen.explore_s, chosen.goals)
-    names = ("sim", *mind(chosen.has_cameras))
-    modules = [registry.build(name, configured) for name in names]
-    with InProcessRunner([*modules, experimenter.module()]) as runner:
+    modules = build(("sim", *agent_modules(chosen.has_cameras)), configured)
+    with running([*modules, experimenter.module()]) as runner:
         runner.run(lambda: experimenter.is_complete)
-        for shell in runner.shells:
-            if shell.intake.rejected:
-                raise CogmapError(f"{shell.module.name} rejected {dict(shell.intake.rejected)}")
 
     assert experimenter.boundaries is not None
     return Town(

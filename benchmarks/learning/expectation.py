@@ -10,16 +10,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from benchmarks.explore.drivable import barrier_m
-from benchmarks.explore.measure import COGNITION, sections
-from benchmarks.explore.trials import street_to_close
-from benchmarks.learning.eyes import Eyes
+from benchmarks.explore.trials import Point, street_to_close
+from benchmarks.harness import (
+    COGNITION,
+    TownObserver,
+    build,
+    pose_array,
+    running,
+    town_sections,
+)
+from benchmarks.learning.visibility import Visibility
 from benchmarks.report import Metrics
-from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import transform_from
-from cogmap.graph.graph import Graph
 from cogmap.parallel import parallel_map
-from cogmap.runtime.in_process import InProcessRunner
-from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
@@ -36,8 +38,7 @@ from cogmap.schemas.nodes import (
     look_of,
     place_cell,
 )
-from cogmap.schemas.sensing import StreetClosure, TruePose, TrueTown
-from cogmap.services import registry
+from cogmap.schemas.sensing import StreetClosure, TruePose
 from cogmap.services.codelets.attention import expectation
 from cogmap.services.sim.config import Config as SimConfig
 from cogmap.services.sim.config import place_of
@@ -63,7 +64,7 @@ class Surprise:
     views on end, and when it first was conscious.
     """
 
-    at_m: tuple[float, float]
+    at_m: Point
     onset_ns: int | None = None
     conscious_ns: int | None = None
     views_ns: list[int] = field(default_factory=list)
@@ -93,9 +94,9 @@ class Surprises:
     false: int
 
 
-def measure(processes: int, towns: int = TOWNS) -> Metrics:
+def measure(processes: int) -> Metrics:
     """The share of surprises that were conscious in time, over so many towns."""
-    found = parallel_map(surprises_in, list(range(FIRST_SEED, FIRST_SEED + towns)), processes)
+    found = parallel_map(surprises_in, list(range(FIRST_SEED, FIRST_SEED + TOWNS)), processes)
     buildings = [each for town in found for each in town.buildings]
     streets = [each for town in found for each in town.streets]
     return {
@@ -109,54 +110,41 @@ def measure(processes: int, towns: int = TOWNS) -> Metrics:
 
 def surprises_in(seed: int) -> Surprises:
     """Explore a town, then drive past buildings that are gone, and into streets that are closed."""
-    configured = sections(seed)
     place = place_of(SimConfig(seed=seed, town="blocks"))
     rng = np.random.default_rng([seed, 0x5E])
     removed = sorted(rng.choice(len(place.plots), REMOVED, replace=False).tolist())
-    removals = [{"building": number, "from_s": EXPLORE_S} for number in removed]
-    configured["sim"] |= {"removals": removals}
+    sections = town_sections(seed)
+    sections["sim"]["removals"] = [{"building": each, "from_s": EXPLORE_S} for each in removed]
 
-    judge = _Judge(place, removed, rng)
-    modules = [registry.build(name, configured) for name in ("sim", *COGNITION)]
-    with InProcessRunner([*modules, judge.module()]) as runner:
+    judge = Judge(place, removed, rng)
+    watching = judge.module("judge", [topics.OFFER, topics.STREET_CLOSURE])
+    watching.on(topics.BROADCAST, judge.on_broadcast)
+    with running([*build(("sim", *COGNITION), sections), watching]) as runner:
         runner.run(lambda: judge.is_complete)
 
     return judge.surprises
 
 
-class _Judge:
-    """Follows the truth and the agent's graph. After it has explored the agent is given the
+class Judge(TownObserver):
+    """Compares what is conscious with the truth. After the agent has explored it is given the
     buildings that are gone as goals; on the way to each a street is closed.
     """
 
     def __init__(self, place: Place, removed: list[int], rng: np.random.Generator) -> None:
-        self.graph = Graph()
+        super().__init__()
+        self.is_complete = False
         self._place = place
-        self._eyes = Eyes(place)
+        self._visibility = Visibility(place)
         self._removed = removed
         self._rng = rng
 
-        self._start: Floats | None = None
-        self._town: TrueTown | None = None
-        self._known: dict[int, str] | None = None
+        self._has_begun = False
         self._buildings: dict[int, Surprise] = {}
         self._streets: dict[str, Surprise] = {}
         self._false = 0
         self._goals: list[str] = []
         self._goal_until_ns = 0
         self._has_closed = False
-        self.is_complete = False
-
-    def module(self) -> Module:
-        """The module to run beside the agent's."""
-        emits = (topics.OFFER, topics.STREET_CLOSURE)
-        return (
-            Module("judge")
-            .following(self.graph)
-            .on(topics.TRUE_TOWN, self.on_town)
-            .on(topics.TRUE_POSE, self.on_pose, emits)
-            .on(topics.BROADCAST, self.on_broadcast)
-        )
 
     @property
     def surprises(self) -> Surprises:
@@ -165,86 +153,67 @@ class _Judge:
         streets = [each for each in self._streets.values() if each.onset_ns is not None]
         return Surprises(buildings, streets, self._false)
 
-    def on_town(self, town: TrueTown) -> None:
-        """The town as it is now."""
-        self._town = town
-
-    def on_pose(self, pose: TruePose) -> list[Message]:
+    def act(self, true: TruePose) -> list[Message]:
         """Note what can be noticed from here, and lead the agent on."""
-        at = np.array([pose.pose.x_m, pose.pose.y_m, pose.pose.heading_rad])
-        if self._start is None:
-            self._start = at
-        if pose.stamp_ns < EXPLORE_S * 1e9:
+        if true.stamp_ns < EXPLORE_S * 1e9:
             return []
-        if self._known is None:
+        if not self._has_begun:
             self._begin()
 
-        self._note(pose.stamp_ns, at)
-        return self._lead(pose.stamp_ns)
+        at = pose_array(true.pose)
+        for number, surprise in self._buildings.items():
+            away_m = math.dist(surprise.at_m, (at[0], at[1]))
+            is_near = away_m <= NOTICEABLE_M
+            surprise.note(true.stamp_ns, is_near and self._visibility.building(at, number))
+
+        for name, surprise in self._streets.items():
+            surprise.note(true.stamp_ns, self._visibility.barrier(at, name, NOTICEABLE_M))
+
+        return self._lead(true.stamp_ns)
+
+    def _begin(self) -> None:
+        """Give as goals the buildings, gone from now on, that the agent's map has."""
+        self._has_begun = True
+        for number in self._removed:
+            plot = self._place.plots[number]
+            for node in self.graph.of_kind(Object):
+                away_m = math.dist(self._in_truth(node.x_m, node.y_m), (plot.x_m, plot.y_m))
+                if look_of(node.label) == plot.kind.name and away_m <= SAME_M:
+                    self._buildings[number] = Surprise((plot.x_m, plot.y_m))
+                    self._goals.append(node.label)
+                    break
 
     def on_broadcast(self, broadcast: Broadcast) -> None:
-        """Note what surprise is conscious."""
-        if broadcast.coalition.codelet != expectation.NAME or self._known is None:
+        """Note the surprises that are conscious."""
+        if broadcast.coalition.codelet != expectation.NAME or not self._has_begun:
             return
 
         for node in broadcast.coalition.nodes:
             if isinstance(node, Object):
-                self._note_gone(node, broadcast.stamp_ns)
+                at_m = self._in_truth(node.x_m, node.y_m)
+                kind = look_of(node.label)
+                gone = [
+                    surprise
+                    for number, surprise in self._buildings.items()
+                    if self._place.plots[number].kind.name == kind
+                ]
+                self._note_conscious(gone, at_m, SAME_M, broadcast.stamp_ns)
 
         for link in broadcast.coalition.links:
             cell = place_cell(link.target)
             if link.kind == LinkKind.BLOCKED and cell is not None:
-                self._note_closed(cell, broadcast.stamp_ns)
+                map_id, i, j = cell
+                cell_m = self.graph.cell_m(map_id)
+                at_m = self._in_truth(i * cell_m, j * cell_m)
+                closed = list(self._streets.values())
+                self._note_conscious(closed, at_m, SAME_BARRIER_M, broadcast.stamp_ns)
 
-    def _begin(self) -> None:
-        """Buildings are gone from now on: the agent's map has some of them."""
-        known = {}
-        for number in self._removed:
-            label = self._label_of(number)
-            if label:
-                plot = self._place.plots[number]
-                known[number] = label
-                self._buildings[number] = Surprise((plot.x_m, plot.y_m))
-
-        self._known = known
-        self._goals = list(known.values())
-
-    def _label_of(self, number: int) -> str:
-        """What the agent calls a building, where its map has it; empty where it has not."""
-        plot = self._place.plots[number]
-        for node in self.graph.of_kind(Object):
-            away_m = math.dist(self._in_truth(node.x_m, node.y_m), (plot.x_m, plot.y_m))
-            if look_of(node.label) == plot.kind.name and away_m <= SAME_M:
-                return node.label
-
-        return ""
-
-    def _note(self, stamp_ns: int, at: Floats) -> None:
-        for number, surprise in self._buildings.items():
-            away_m = math.dist(surprise.at_m, (at[0], at[1]))
-            is_near = away_m <= NOTICEABLE_M
-            surprise.note(stamp_ns, is_near and self._eyes.sees_building(at, number))
-
-        for name, surprise in self._streets.items():
-            surprise.note(stamp_ns, self._eyes.sees_barrier(at, name, NOTICEABLE_M))
-
-    def _note_gone(self, node: Object, stamp_ns: int) -> None:
-        at_m = self._in_truth(node.x_m, node.y_m)
-        for number, surprise in self._buildings.items():
-            plot = self._place.plots[number]
-            if look_of(node.label) == plot.kind.name and math.dist(at_m, surprise.at_m) <= SAME_M:
-                if surprise.conscious_ns is None:
-                    surprise.conscious_ns = stamp_ns
-                return
-
-        self._false += 1
-
-    def _note_closed(self, cell: tuple[str, int, int], stamp_ns: int) -> None:
-        map_id, i, j = cell
-        cell_m = self.graph.cell_m(map_id)
-        at_m = self._in_truth(i * cell_m, j * cell_m)
-        for surprise in self._streets.values():
-            if math.dist(at_m, surprise.at_m) <= SAME_BARRIER_M:
+    def _note_conscious(
+        self, surprises: list[Surprise], at_m: Point, within_m: float, stamp_ns: int
+    ) -> None:
+        """Note that the first of some surprises within a distance is conscious, or a false one."""
+        for surprise in surprises:
+            if math.dist(at_m, surprise.at_m) <= within_m:
                 if surprise.conscious_ns is None:
                     surprise.conscious_ns = stamp_ns
                 return
@@ -276,26 +245,24 @@ class _Judge:
     def _close(self, goal: str) -> list[Message]:
         """Close a street of the route to the goal, where one can be."""
         plan = self.graph.get(Plan, PLAN_ID)
-        if plan is None or plan.route is None or goal not in plan.goals or self._town is None:
+        if plan is None or plan.route is None or goal not in plan.goals or self.town is None:
             return []
 
-        assert self._start is not None
         self._has_closed = True
-        route_m = transform_from(self._start, np.asarray(plan.route.numpy(), np.float64))
+        route_m = self.to_truth(np.asarray(plan.route.numpy(), np.float64))
         goal_x_m, goal_y_m = route_m[-1].tolist()
-        closure = street_to_close(self._rng, self._town, route_m, (goal_x_m, goal_y_m))
+        closure = street_to_close(self._rng, self.town, route_m, (goal_x_m, goal_y_m))
         if closure is None or closure.street in self._streets:
             return []
 
-        (street,) = [each for each in self._town.streets if each.name == closure.street][:1]
+        (street,) = [each for each in self.town.streets if each.name == closure.street][:1]
         middle_m = np.asarray(barrier_m(street), np.float64).mean(axis=0).tolist()
         self._streets[closure.street] = Surprise((middle_m[0], middle_m[1]))
         return [StreetClosure(street=closure.street, closed=True)]
 
-    def _in_truth(self, x_m: float, y_m: float) -> tuple[float, float]:
+    def _in_truth(self, x_m: float, y_m: float) -> Point:
         """A position of the agent's map in the true frame."""
-        assert self._start is not None
-        true_x_m, true_y_m = transform_from(self._start, np.array([[x_m, y_m]]))[0].tolist()
+        true_x_m, true_y_m = self.to_truth(np.array([[x_m, y_m]]))[0].tolist()
         return true_x_m, true_y_m
 
 

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import gc
-import time
-from collections.abc import Callable
-from typing import NamedTuple
 
 import click
 import numpy as np
@@ -13,22 +10,18 @@ import psutil
 from scipy.spatial import KDTree
 
 from benchmarks.benchmark import Setting
-from benchmarks.explore.measure import COGNITION, sections
+from benchmarks.harness import COGNITION, CycleMeter, build, running, town_sections
 from benchmarks.lifelong.courier import Courier
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
-from cogmap.bus.interface import Arrival
-from cogmap.bus.memory import MemoryBus
-from cogmap.cli.launch.metrics import objects, position_m
 from cogmap.cli.launch.observer import Observer
 from cogmap.cli.log.progress import bar
 from cogmap.errors import CogmapError
+from cogmap.graph.graph import Graph
 from cogmap.parallel import Progress
-from cogmap.runtime.config import Sections
-from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
-from cogmap.services import registry
+from cogmap.schemas.nodes import Object
 
 SEED = 3201
 CYCLES = 20_000
@@ -55,89 +48,6 @@ OPTIONS = (
 )
 
 
-class Mark(NamedTuple):
-    """What had been spent by the end of a cycle."""
-
-    cpu_s: float
-    log_bytes: int
-
-
-class Meter:
-    """Notes what all modules had spent at the end of each cycle, which is the command's."""
-
-    def __init__(self) -> None:
-        self.marks = [Mark(time.process_time(), 0)]
-        self._log_bytes = 0
-
-    @property
-    def cycles(self) -> int:
-        """How many cycles have ended."""
-        return len(self.marks) - 1
-
-    def listen(self, bus: MemoryBus) -> None:
-        """Subscribe to every topic, as the recorder does."""
-        for topic in topics.ALL:
-            bus.subscribe(topic, self._on_message, _ignore_gap)
-        bus.subscribe(topics.MOTOR_COMMAND, self._on_command, _ignore_gap)
-
-    def spent(self, last: int) -> tuple[float, float]:
-        """The mean CPU time, in s, and bytes of messages of the SPAN cycles up to `last`."""
-        before = self.marks[max(0, last - SPAN)]
-        after = self.marks[last]
-        cycles = last - max(0, last - SPAN)
-        return (after.cpu_s - before.cpu_s) / cycles, (after.log_bytes - before.log_bytes) / cycles
-
-    def _on_message(self, arrival: Arrival) -> None:
-        self._log_bytes += len(arrival.payload)
-
-    def _on_command(self, arrival: Arrival) -> None:
-        self.marks.append(Mark(time.process_time(), self._log_bytes))
-
-
-def _ignore_gap(source: str, count: int) -> None:
-    """The bus in memory loses nothing."""
-
-
-class _Days:
-    """One drive, looked at from outside: its map after the second lap, memory after EARLY_AT."""
-
-    def __init__(self, seed: int, early_at: int) -> None:
-        self.meter = Meter()
-        self.courier = Courier(seed)
-        self.observer = Observer()
-        self.early_error_m = float("nan")
-        self.early_bytes = 0
-        self._early_at = early_at
-
-    def module(self) -> Module:
-        """The module that observes."""
-        module = Module("observer")
-        for topic in OBSERVED:
-            module = module.on(topic, self.observer.update)
-        return module
-
-    def look(self) -> None:
-        """Note what is due by now."""
-        if np.isnan(self.early_error_m) and self.courier.laps >= MIN_LAPS:
-            self.early_error_m = self.error_m
-        if not self.early_bytes and self.meter.cycles >= self._early_at:
-            self.early_bytes = _resident_bytes()
-
-    @property
-    def error_m(self) -> float:
-        """How far the objects of the map are from the nearest building on average, whatever name
-        they have.
-        """
-        town = self.observer.town
-        learned = [position_m(each) for each in objects(self.courier.graph)]
-        if town is None or not learned:
-            return float("nan")
-
-        built_m = [(building.pose.x_m, building.pose.y_m) for building in town.buildings]
-        away_m, _ = KDTree(built_m).query(self.observer.to_world(np.array(learned)))
-        return float(np.mean(away_m))
-
-
 def measure(setting: Setting, *, cycles: int = CYCLES) -> Metrics:
     """Measure the cost of a cycle after hours in one town over its cost early, and the error of the
     map.
@@ -153,59 +63,73 @@ def drive(cycles: int, progress: Progress, early_at: int = EARLY_AT, seed: int =
     """Return the metrics of so many cycles in one town. Raises CogmapError if a module rejected a
     message, or the drive ended before.
     """
-    days = _Days(seed, early_at)
-    configured = _sections(seed, cycles)
-    modules = [registry.build(name, configured) for name in ("sim", *COGNITION)]
-    with InProcessRunner([*modules, days.courier.module(), days.module()]) as runner:
-        days.meter.listen(MemoryBus(runner.network))
-        runner.run(_until(days, cycles, progress))
-        for shell in runner.shells:
-            if shell.intake.rejected:
-                raise CogmapError(f"{shell.module.name} rejected {dict(shell.intake.rejected)}")
+    sections = town_sections(seed)
+    # Longer than the cycles take, at five a second.
+    sections["sim"]["duration_s"] = 2.0 * cycles / CYCLES_PER_S
 
-        late_bytes = _resident_bytes()
+    courier = Courier(seed)
+    observer = Observer()
+    watching = Module("observer")
+    for topic in OBSERVED:
+        watching.on(topic, observer.update)
 
-    if days.meter.cycles < cycles:
-        raise CogmapError(f"the drive ended after {days.meter.cycles} of {cycles} cycles")
-    return _metrics(days, cycles, early_at, late_bytes)
+    meter = CycleMeter()
+    early_bytes = 0
+    early_error_m = float("nan")
 
+    def is_over() -> bool:
+        """Note what is due by now: the map after the second lap, memory after `early_at`."""
+        nonlocal early_bytes, early_error_m
+        if np.isnan(early_error_m) and courier.laps >= MIN_LAPS:
+            early_error_m = map_error_m(courier.graph, observer)
+        if not early_bytes and meter.cycles >= early_at:
+            early_bytes = resident_bytes()
 
-def _metrics(days: _Days, cycles: int, early_at: int, late_bytes: int) -> Metrics:
-    early_s, early_log_bytes = days.meter.spent(early_at)
-    late_s, late_log_bytes = days.meter.spent(cycles)
+        progress(meter.cycles / cycles)
+        return meter.cycles >= cycles
+
+    modules = build(("sim", *COGNITION), sections)
+    with running([*modules, courier.module("courier", [topics.OFFER]), watching]) as runner:
+        meter.listen(runner, topics.ALL)
+        runner.run(is_over)
+        late_bytes = resident_bytes()
+
+    if meter.cycles < cycles:
+        raise CogmapError(f"the drive ended after {meter.cycles} of {cycles} cycles")
+
+    early_s, early_log_bytes = meter.spent(max(0, early_at - SPAN), early_at)
+    late_s, late_log_bytes = meter.spent(max(0, cycles - SPAN), cycles)
+    error_m = map_error_m(courier.graph, observer)
     return {
         "cycle_ratio": late_s / early_s,
         "log_bytes_ratio": late_log_bytes / early_log_bytes,
-        "memory_ratio": late_bytes / days.early_bytes,
-        "map_error_ratio": days.error_m / days.early_error_m,
+        "memory_ratio": late_bytes / early_bytes,
+        "map_error_ratio": error_m / early_error_m,
         "cycle_cpu_ms_early": early_s * 1e3,
         "cycle_cpu_ms_late": late_s * 1e3,
         "log_bytes_early": early_log_bytes,
         "log_bytes_late": late_log_bytes,
         "memory_mb_late": late_bytes / 1e6,
-        "map_error_m_late": days.error_m,
-        "laps": float(days.courier.laps),
-        "travelled_m": days.observer.travelled_m,
+        "map_error_m_late": error_m,
+        "laps": float(courier.laps),
+        "travelled_m": observer.travelled_m,
     }
 
 
-def _until(days: _Days, cycles: int, progress: Progress) -> Callable[[], bool]:
-    def has_ended() -> bool:
-        days.look()
-        progress(days.meter.cycles / cycles)
-        return days.meter.cycles >= cycles
+def map_error_m(graph: Graph, observer: Observer) -> float:
+    """Return the mean distance of the objects of a map from the nearest building of any name; NaN
+    of none.
+    """
+    learned_m = [(node.x_m, node.y_m) for node in graph.of_kind(Object)]
+    if observer.town is None or not learned_m:
+        return float("nan")
 
-    return has_ended
-
-
-def _sections(seed: int, cycles: int) -> Sections:
-    """The town of exploration, driven through without exploring for longer than `cycles`."""
-    configured = sections(seed)
-    configured["sim"] = configured["sim"] | {"duration_s": 2.0 * cycles / CYCLES_PER_S}
-    return configured
+    built_m = [(building.pose.x_m, building.pose.y_m) for building in observer.town.buildings]
+    away_m, _ = KDTree(built_m).query(observer.to_world(np.array(learned_m)))
+    return float(np.mean(away_m))
 
 
-def _resident_bytes() -> int:
-    """The memory of this process, with all modules in it."""
+def resident_bytes() -> int:
+    """Return the memory of this process, with all modules in it."""
     gc.collect()
     return int(psutil.Process().memory_info().rss)

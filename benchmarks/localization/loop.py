@@ -41,13 +41,6 @@ Landmarks = dict[str, tuple[float, float]]
 
 def sections(surveyed: bool) -> Sections:
     """The configuration of both modules; no loop is closed on a map that was surveyed."""
-    workspace = {
-        "mode": "lockstep",
-        "awaits_scan": False,
-        "awaits_competition": False,
-        "base_level_decay": 0.0,
-    }
-
     codelets = {
         "samples": SAMPLES,
         "kept_samples": 100,
@@ -74,7 +67,11 @@ def sections(surveyed: bool) -> Sections:
     if surveyed:
         codelets["revisit_s"] = NEVER_S
 
-    return {"workspace": workspace, "codelets": codelets}
+    return {
+        "run": {"lockstep": True},
+        "workspace": {"base_level_decay": 0.0},
+        "codelets": codelets,
+    }
 
 
 class LocalizationLoop:

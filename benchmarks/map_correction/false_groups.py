@@ -18,13 +18,13 @@ from benchmarks.threshold import at_least, at_most
 from benchmarks.trajectory import trajectory_error_m
 from cogmap.cli.log.progress import bar
 from cogmap.errors import UsageError
+from cogmap.estimation.gnc import inliers
+from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.pose_graph import Constraints, PoseGraph
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import compose, integrate, relative
 from cogmap.parallel import parallel_map
 from cogmap.services.codelets.config import Config
-from cogmap.services.codelets.correction.gnc import inliers
-from cogmap.services.codelets.correction.least_squares import optimize
-from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
 
 THRESHOLDS = {
     "ate_ratio": at_most(1.1),

@@ -8,8 +8,8 @@ from cogmap.data.g2o import read_g2o
 from cogmap.data.pose_graph import PoseGraphFile, read_true_positions
 from cogmap.data.toro import read_toro
 from cogmap.errors import MessageError, UsageError
+from cogmap.estimation.pose_graph import Constraints, PoseGraph
 from cogmap.geometry.arrays import Floats
-from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
 
 READERS = {".g2o": read_g2o, ".graph": read_toro, ".toro": read_toro}
 

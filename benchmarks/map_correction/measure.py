@@ -17,15 +17,15 @@ from benchmarks.threshold import at_most
 from benchmarks.timing import timed
 from benchmarks.trajectory import trajectory_error_m
 from cogmap.cli.log.progress import bar
-from cogmap.geometry.arrays import Floats
-from cogmap.services.codelets.correction.incremental import IncrementalSolver
-from cogmap.services.codelets.correction.least_squares import optimize
-from cogmap.services.codelets.correction.pose_graph import PoseGraph, cost
-from cogmap.services.codelets.correction.reverse_replay import (
+from cogmap.estimation.incremental import IncrementalSolver
+from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.pose_graph import PoseGraph, cost
+from cogmap.estimation.reverse_replay import (
     close_loops,
     displacements,
     position_cost,
 )
+from cogmap.geometry.arrays import Floats
 
 THRESHOLDS = {
     "positions_cost_ratio": at_most(1.05),

@@ -9,9 +9,9 @@ from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
 from benchmarks import optional
+from cogmap.estimation.pose_graph import Constraints, PoseGraph
+from cogmap.estimation.reverse_replay import displacements
 from cogmap.geometry.arrays import Floats
-from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
-from cogmap.services.codelets.correction.reverse_replay import displacements
 
 
 def best_positions(graph: PoseGraph) -> Floats:

@@ -86,8 +86,7 @@ def join(learned: Snapshot) -> Joined:
     endpoint = free_endpoint()
     router = open_router(endpoint)
     configured = sections()
-    without_scans = configured["workspace"] | {"awaits_scan": False}
-    workspace = registry.build("workspace", configured | {"workspace": without_scans})
+    workspace = registry.build("workspace", configured | {"run": {"lockstep": True}})
     if workspace.restore is not None:
         workspace.restore([learned])
 

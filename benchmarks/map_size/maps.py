@@ -24,7 +24,7 @@ from cogmap.schemas.nodes import (
     object_id,
 )
 from cogmap.services.codelets.config import Config
-from cogmap.services.codelets.resolution import coarse_places, sub_map_places
+from cogmap.services.codelets.sub_maps import coarse_places, sub_map_places
 
 SPREAD_M = 0.3
 CELL_M = 1.0

@@ -12,10 +12,10 @@ from benchmarks.map_structure.peer import adjusted_rand_index, gaussian_mixture
 from benchmarks.map_structure.towns import FUNCTIONS, Town, town
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most, more_than
+from cogmap.experiments.map_structure.boundaries import Boundaries
 from cogmap.geometry.arrays import Indices
-from cogmap.services.codelets.structure.config import Config
-from cogmap.services.codelets.structure.crossings import Boundaries
-from cogmap.services.codelets.structure.sub_maps import SubMaps
+from cogmap.services.codelets.sub_maps.config import Config
+from cogmap.services.codelets.sub_maps.sub_maps import SubMaps
 
 THRESHOLDS = {
     "ari": at_least(0.9),

@@ -12,23 +12,26 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from benchmarks.explore.measure import COGNITION
-from benchmarks.explore.measure import sections as explored
+from benchmarks.harness import (
+    COGNITION,
+    TownObserver,
+    build,
+    pose_array,
+    running,
+    town_sections,
+)
 from benchmarks.report import Metrics
-from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose, relative
-from cogmap.graph.graph import Graph
-from cogmap.parallel import Progress, parallel_map
+from cogmap.parallel import parallel_map
 from cogmap.runtime.config import Sections
-from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
+from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.memory import Restored, Stored, StoredRecord
 from cogmap.schemas.nodes import ROOT_MAP, Map
-from cogmap.schemas.sensing import Pose, TruePose
-from cogmap.services import registry
+from cogmap.schemas.sensing import TruePose
 
 FIRST_SEED = 101
 TOWNS = 10
@@ -43,14 +46,14 @@ MEMORY = "memory"
 
 @dataclass(frozen=True)
 class Visit:
-    """A drive in a town from one of its starts, with what is remembered. It ends after `lasts_s`,
-    or SETTLE_S after a map was recalled.
+    """A drive in a town from one of its starts, with the records remembered. It ends after
+    `duration_s`, or SETTLE_S after a map was recalled.
     """
 
     seed: int
     start: int
     known: Sequence[StoredRecord]
-    lasts_s: float
+    duration_s: float
 
 
 class Drive(NamedTuple):
@@ -75,124 +78,110 @@ class Drive(NamedTuple):
         return math.hypot(x_m, y_m), abs(turn_rad)
 
 
-class Observer:
+class DriveObserver(TownObserver):
     """Follows a drive and its graph, and keeps what is stored."""
 
     def __init__(self, visit: Visit) -> None:
+        super().__init__()
         self._visit = visit
-        self._graph = Graph()
         self._records: dict[str, StoredRecord] = {}
-        self._began: Floats | None = None
         self._true_at: dict[int, Floats] = {}
         self._now_ns = 0
         self._driven_m = 0.0
         self._recalled = ""
         self._recalled_m = math.nan
-        self._recalled_ns = 0
+        self._ends_ns = visit.duration_s * 1e9
 
-    def modules(self) -> list[Module]:
-        """What takes part in the drive: an observer, and a store of what is remembered."""
-        observer = (
-            Module("observer")
-            .following(self._graph, self._on_delta)
-            .on(topics.TRUE_POSE, self._on_true)
-            .on(topics.STORED, self._on_stored)
-        )
-        restored = Restored(records=list(self._visit.known))
-        store = Module("store").on_start(lambda: restored, {MEMORY: 1}, [topics.RESTORED])
-        return [observer, store]
+    def act(self, true: TruePose) -> list[Message]:
+        """Keep the pose."""
+        self._now_ns = true.stamp_ns
+        self._driven_m = true.travelled_m
+        self._true_at[true.stamp_ns] = pose_array(true.pose)
+        return []
+
+    def on_stored(self, stored: Stored) -> None:
+        """Keep what is remembered."""
+        for record in stored.records:
+            self._records[record.key] = record
+        for key in stored.forgotten:
+            self._records.pop(key, None)
+
+    def on_delta(self, delta: Delta) -> None:
+        """Note the first map that is recalled; a while later the drive is over."""
+        if delta.phase is not Phase.CORRECTION or self._recalled:
+            return
+
+        root = self.graph.get(Map, ROOT_MAP)
+        if root is not None and root.remembered:
+            self._recalled = root.remembered
+            self._recalled_m = self._driven_m
+            self._ends_ns = min(self._ends_ns, self._now_ns + SETTLE_S * 1e9)
 
     @property
-    def is_complete(self) -> bool:
-        """Whether the drive is over."""
-        ends_ns = self._visit.lasts_s * 1e9
-        if self._recalled:
-            ends_ns = min(ends_ns, self._recalled_ns + SETTLE_S * 1e9)
-        return self._now_ns >= ends_ns
+    def is_over(self) -> bool:
+        """Whether the drive has ended."""
+        return self._now_ns >= self._ends_ns
 
     def drive(self) -> Drive:
-        """What the drive came to."""
-        agent = self._graph.agent
+        """Return the result of the drive."""
+        agent = self.graph.agent
         assert agent is not None
-        assert self._began is not None
+        assert self.start is not None
         return Drive(
             driven_m=self._driven_m,
             recalled=self._recalled,
             recalled_m=self._recalled_m,
             believed=np.array([agent.x_m, agent.y_m, agent.heading_rad]),
             true=self._true_at[agent.stamp_ns],
-            began=self._began,
+            began=self.start,
             stored=list(self._records.values()),
         )
 
-    def _on_true(self, true: TruePose) -> None:
-        self._now_ns = true.stamp_ns
-        self._driven_m = true.travelled_m
-        self._true_at[true.stamp_ns] = _as_array(true.pose)
-        if self._began is None:
-            self._began = _as_array(true.pose)
-
-    def _on_stored(self, stored: Stored) -> None:
-        for record in stored.records:
-            self._records[record.key] = record
-        for key in stored.forgotten:
-            self._records.pop(key, None)
-
-    def _on_delta(self, delta: Delta) -> None:
-        if delta.phase is not Phase.CORRECTION or self._recalled:
-            return
-
-        root = self._graph.get(Map, ROOT_MAP)
-        if root is not None and root.remembered:
-            self._recalled = root.remembered
-            self._recalled_m = self._driven_m
-            self._recalled_ns = self._now_ns
-
 
 def visit(chosen: Visit) -> Drive:
-    """Drive through a town. Raises CogmapError where a module rejected a message."""
-    configured = sections(chosen)
-    observer = Observer(chosen)
-    modules = [registry.build(name, configured) for name in ("sim", *COGNITION, MEMORY)]
-    with InProcessRunner([*modules, *observer.modules()]) as runner:
-        runner.run(lambda: observer.is_complete)
-        for shell in runner.shells:
-            if shell.intake.rejected:
-                raise CogmapError(f"{shell.module.name} rejected {dict(shell.intake.rejected)}")
+    """Drive through a town. Raises CogmapError if a module rejected a message."""
+    observer = DriveObserver(chosen)
+    watching = observer.module("observer").on(topics.STORED, observer.on_stored)
+
+    # It has what is remembered, in the place of the service that stores it.
+    restored = Restored(records=list(chosen.known))
+    store = Module("store").on_start(lambda: restored, {MEMORY: 1}, [topics.RESTORED])
+
+    modules = build(("sim", *COGNITION, MEMORY), sections(chosen))
+    with running([*modules, watching, store]) as runner:
+        runner.run(lambda: observer.is_over)
 
     return observer.drive()
 
 
 def sections(chosen: Visit) -> Sections:
     """A robot that explores a town and remembers, in lockstep, with percept-level sensing."""
-    configured = explored(chosen.seed)
+    configured = town_sections(chosen.seed)
     sim = configured["sim"]
     sim["start"] = chosen.start
-    sim["awaits"] = {**sim["awaits"], MEMORY: 1}
-    configured["workspace"]["offering"] = [MEMORY]
-    configured[MEMORY] = {"mode": "lockstep"}
+    configured["run"]["participants"][MEMORY] = 1
     return configured
 
 
-def measure(processes: int, progress: Progress = lambda share: None, towns: int = TOWNS) -> Metrics:
+def measure(processes: int) -> Metrics:
     """How far is driven before the map of the first run is recalled and right, over the first run's
     way; and how often one of the other towns' maps is recalled instead.
 
     A town whose map is not recalled, or wrongly, counts with the whole way of the second run.
     """
-    seeds = list(range(FIRST_SEED, FIRST_SEED + towns))
+    seeds = list(range(FIRST_SEED, FIRST_SEED + TOWNS))
     learning = [Visit(seed, FIRST_START, (), LEARN_S) for seed in seeds]
-    first = parallel_map(visit, learning, processes, lambda share: progress(share / 3))
+    first = parallel_map(visit, learning, processes)
 
     later = []
     for number, seed in enumerate(seeds):
         later.append(Visit(seed, SECOND_START, named(first[number].stored, seed), LEARN_S))
-        others = [named(first[other].stored, seeds[other]) for other in range(towns)]
+        others = [named(first[other].stored, seeds[other]) for other in range(TOWNS)]
         del others[number]
         strange = [record for records in others for record in records]
         later.append(Visit(seed, SECOND_START, strange, LEARN_S))
 
-    drives = parallel_map(visit, later, processes, lambda share: progress((1 + 2 * share) / 3))
+    drives = parallel_map(visit, later, processes)
     own, strange_drives = drives[::2], drives[1::2]
     shares = []
     are_right = []
@@ -227,7 +216,3 @@ def is_right(first: Drive, second: Drive) -> bool:
 
     error_m, error_rad = second.error(first.began)
     return error_m <= RIGHT_WITHIN_M and error_rad <= RIGHT_WITHIN_RAD
-
-
-def _as_array(pose: Pose) -> Floats:
-    return np.array([pose.x_m, pose.y_m, pose.heading_rad])

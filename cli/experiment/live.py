@@ -34,8 +34,8 @@ def differing(sections: Sections, modules: Sequence[str]) -> list[str]:
 
     The simulation is one of them and moves its robot itself, so nothing else has to be there.
     """
-    awaits = {**sections["sim"]["awaits"], transcript.NAME: 1}
-    sections = {**sections, "sim": {**sections["sim"], "awaits": awaits}}
+    participants = {**sections["run"]["participants"], transcript.NAME: 1}
+    sections = {**sections, "run": {**sections["run"], "participants": participants}}
     inside = Transcript(transcript.MODEL)
     outside = Transcript(transcript.MODEL)
 

@@ -63,10 +63,10 @@ class Drive:
             self.guide = Guide(EXPLORE_S, self.choices.goals)
 
     @property
-    def awaited(self) -> Mapping[str, int]:
-        """How many instances of each module the drive waits for."""
-        awaits: dict[str, int] = self.sections["sim"]["awaits"]
-        return awaits | {"sim": 1}
+    def participants(self) -> Mapping[str, int]:
+        """How many instances of each module take part."""
+        participants: dict[str, int] = self.sections["run"]["participants"]
+        return participants
 
     def run(self, until_s: float, stop: Stop, display: Display) -> tuple[Watch, Ending]:
         """Drive until every goal is reached, the time of the drive is over, it cannot succeed,
@@ -99,8 +99,7 @@ class Drive:
                 raise
             return Ending(Outcome.MODULE_FAILED, str(error))
 
-        in_lockstep = self.sections["sim"]["mode"] == "lockstep"
-        if in_lockstep and watch.tally.observer.has_ended:
+        if self.sections["run"]["lockstep"] and watch.tally.observer.has_ended:
             watch.pump_until_quiet(QUIET_S)
         return ending
 
@@ -121,12 +120,12 @@ class Drive:
     def _follow(self, watch: Watch, until_s: float, stop: Stop, display: Display) -> Ending:
         next_s = 0.0
         shown: Stage | None = None
-        missing = watch.missing(self.awaited)
+        missing = watch.missing(self.participants)
         while (ending := self._ending(watch, missing, until_s, stop)) is None:
             watch.pump(PUMP_S)
             self._guide_agent(watch)
             self.supervisor.check()
-            missing = watch.missing(self.awaited)
+            missing = watch.missing(self.participants)
             self._note_progress(watch, missing)
             if time.monotonic() >= next_s:
                 next_s = time.monotonic() + SHOW_PERIOD_S

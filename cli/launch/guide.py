@@ -11,6 +11,7 @@ import numpy as np
 
 from cogmap.cli.launch.observer import Observer
 from cogmap.geometry.arrays import Floats
+from cogmap.geometry.polylines import distances_along
 from cogmap.graph.graph import Graph
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
@@ -164,8 +165,7 @@ def streets_ahead(town: TrueTown, route_m: Floats) -> list[Passed]:
     """The streets whose middle, where a barrier stands, a (n, 2) route passes, BARRIER_AHEAD_M
     ahead at least; in the order of the town.
     """
-    steps_m = np.hypot(*np.diff(route_m, axis=0).T)
-    along_m = np.concatenate([[0.0], steps_m.cumsum()])
+    along_m = distances_along(route_m)
     passed = []
     for street in town.streets:
         middle_m = (np.array(street.line_m[0]) + street.line_m[-1]) / 2

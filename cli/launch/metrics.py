@@ -138,7 +138,7 @@ class RecordedMetrics(DriveMetrics, kw_only=True):
 
     completed: bool
     seed: int
-    mode: str
+    lockstep: bool
     log: Recording | None
 
 

@@ -32,7 +32,6 @@ STATE_NAME = "state"
 MEMORY_NAME = "memory.db"
 REPLICATED = "codelets"
 MEMORY = "memory"
-MOTOR = "motor"
 TOUR_TOWN_M = 120.0
 TOUR_LIMIT_S = 600.0
 EXPLORE_S = 150.0
@@ -71,7 +70,7 @@ class Choices:
     energy: bool = False
 
 
-def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Sections:
+def effective(base: Sections, choices: Choices, observer: bool) -> Sections:
     """The whole configuration of every module: `base`, the choices, the agent's first goals, and
     the default of every other key. Raises ConfigError.
     """
@@ -81,7 +80,7 @@ def effective(base: Sections, choices: Choices, awaits: dict[str, int]) -> Secti
             "--laps is of the loop town, and of a drive without goals of its own: leave it out"
         )
 
-    chosen = _chosen(base, choices, awaits)
+    chosen = _chosen(base, choices, observer)
     return {name: _complete(chosen, name) for name in registry.sections()}
 
 
@@ -93,31 +92,20 @@ def _has_laps(base: Sections, choices: Choices) -> bool:
     return not is_given and (choices.town or sim.get("town", LOOP)) == LOOP
 
 
-def _chosen(base: Sections, choices: Choices, awaits: dict[str, int]) -> Sections:
+def _chosen(base: Sections, choices: Choices, observer: bool) -> Sections:
     """Every section there may be, as in `base` where it is, with the choices in it."""
     sensing = base.get("sim", {}).get("sensing", "percepts")
     is_stepped = choices.lockstep or (choices.tour and sensing == "percepts")
-    mode = "lockstep" if is_stepped else "real_time"
-    sections: Sections = {}
-    for name in registry.sections():
-        section = dict(base.get(name, {}))
-        if "mode" in registry.config_type(name).__struct_fields__:
-            section.setdefault("mode", mode)
-        sections[name] = section
-
-    if is_stepped:
-        sections["workspace"].setdefault("offering", [MEMORY, MOTOR])
-        sections[MOTOR].setdefault("makes_offers", True)
-
+    sections = {name: dict(base.get(name, {})) for name in registry.sections()}
+    sections["run"].setdefault("lockstep", is_stepped)
+    sections["run"].setdefault("participants", participants(choices, observer))
     sim = sections["sim"]
-    sim.setdefault("awaits", awaits)
     if choices.seed is not None:
         sim["seed"] = choices.seed
     if choices.town is not None:
         sim["town"] = choices.town
     if choices.energy:
-        sim["energy"] = True
-        sections["workspace"]["awaits_energy"] = True
+        sections["run"]["energy"] = True
     if choices.tour:
         _set_out(sim)
     if sim.get("sensing") == "percepts":
@@ -193,17 +181,16 @@ def _complete(sections: Sections, name: str) -> dict[str, Any]:
     return complete
 
 
-def awaited(choices: Choices, observer: bool) -> dict[str, int]:
-    """How many instances of whom the simulator waits for: every other module, the workers, the
-    recorder, and an `observer`.
+def participants(choices: Choices, observer: bool) -> dict[str, int]:
+    """How many instances of whom take part: every module, the workers, the recorder, and an
+    `observer`.
     """
-    awaits = {name: 1 for name in registry.MODULES if name != "sim"}
-    awaits[REPLICATED] = choices.codelets
+    members = dict.fromkeys(registry.MODULES, 1) | {REPLICATED: choices.codelets}
     if choices.record:
-        awaits[RECORDER] = 1
+        members[RECORDER] = 1
     if observer:
-        awaits[OBSERVER] = 1
-    return awaits
+        members[OBSERVER] = 1
+    return members
 
 
 def to_toml(sections: Sections) -> str:

@@ -97,7 +97,7 @@ def _followed(reader: LogReader) -> tuple[RecordedMetrics, Tally]:
         **msgspec.structs.asdict(metrics),
         completed=metrics.progress >= 1.0,
         seed=int(_setting(config, "sim", "seed")),
-        mode=str(_setting(config, "sim", "mode")),
+        lockstep=bool(_setting(config, "run", "lockstep")),
         log=Recording.read(reader.path),
     )
     return recorded, tally

@@ -8,6 +8,7 @@ from cogmap.cli.launch.plan import MEMORY, Choices
 from cogmap.cli.memory.source import checked
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
+from cogmap.runtime.run import SECTION, Run
 from cogmap.services import registry
 from cogmap.services.sim.config import Config, check
 from cogmap.services.sim.layout import towns
@@ -24,14 +25,14 @@ def check_inputs(sections: Sections, choices: Choices) -> None:
     if PROCEDURAL not in choices.without:
         registry.build(PROCEDURAL, sections)
     if SIM not in choices.without:
-        _check_town(config.typed(sections, SIM, Config))
+        _check_town(config.typed(sections, SIM, Config), config.typed(sections, SECTION, Run))
     if MEMORY not in choices.without and choices.memory is not None:
         _check_memory(choices.memory)
 
 
-def _check_town(settings: Config) -> None:
+def _check_town(settings: Config, run: Run) -> None:
     """A town from a seed is made by the simulation alone: a large one takes seconds."""
-    check(settings)
+    check(settings, run)
     if settings.town.startswith(towns.OSM):
         towns.place(settings.town, settings.seed, settings.town_size_m)
 

@@ -16,7 +16,7 @@ from cogmap.bus.session import check_free
 from cogmap.cli import BEGAN_S
 from cogmap.cli.launch.drive import Drive
 from cogmap.cli.launch.forking.client import ForkServer
-from cogmap.cli.launch.plan import CONFIG_NAME, Choices, awaited, effective
+from cogmap.cli.launch.plan import CONFIG_NAME, Choices, effective
 from cogmap.cli.run import summary
 from cogmap.cli.run.checks import check_inputs
 from cogmap.cli.run.command import default_limit_s
@@ -53,7 +53,7 @@ def run_drive(start: Start, server: ForkServer | None) -> int:
     stop = Stop()
     choices = start.choices
     console = Console(stderr=start.as_json)
-    sections = effective(start.given, choices, awaited(choices, observer=True))
+    sections = effective(start.given, choices, observer=True)
     check_inputs(sections, choices)
     if choices.own_router:
         check_free(start.endpoint)

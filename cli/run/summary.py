@@ -43,7 +43,6 @@ def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
 
 
 def _run_metrics(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
-    sim = drive.sections["sim"]
     of_drive = drive_metrics(watch.tally, watch.gaps(), watch.rejected())
     log = Recording.read(drive.folder / LOG_NAME) if drive.choices.record else None
     return RunMetrics(
@@ -51,8 +50,8 @@ def _run_metrics(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
         completed=ending.outcome is Outcome.ROUTE_COMPLETE,
         ended_by=ending.outcome.value,
         reason=ending.reason,
-        seed=sim["seed"],
-        mode=sim["mode"],
+        seed=drive.sections["sim"]["seed"],
+        lockstep=drive.sections["run"]["lockstep"],
         codelets=drive.choices.codelets,
         wall_s=time.monotonic() - drive.began_s,
         start_s=drive.start_s,

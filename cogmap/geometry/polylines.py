@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.se2 import cumulative
 
 CHUNK = 4096
 
@@ -20,8 +21,11 @@ class Nearest(NamedTuple):
 
 def distances_along(points_m: Floats) -> Floats:
     """(n,): how far along a polyline each of its points is, in metres."""
+    if not len(points_m):
+        return np.zeros(0)
+
     lengths_m = np.hypot(*np.diff(points_m, axis=0).T)
-    return np.concatenate([[0.0], np.cumsum(lengths_m)])
+    return cumulative(lengths_m)
 
 
 def points_at(points_m: Floats, along_m: Floats) -> Floats:

@@ -44,22 +44,19 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
     """The configuration of every module for one traversal, as for `cogmap run --config`."""
     correction = settings(method, SPEED_M_S / FRAME_HZ)
     sim = {
-        "mode": "lockstep",
         "seed": tour.seed,
         "trajectory": _trajectory(environment, tour),
         "noise": msgspec.structs.asdict(noise),
         "percepts": {"field_of_view_rad": FIELD_OF_VIEW_RAD},
         "frame_hz": FRAME_HZ,
-        "awaits": dict.fromkeys(COGNITION, 1),
     }
-    workspace = {"mode": "lockstep", "cell_m": CELL_M, "base_level_decay": 0.0}
+    workspace = {"cell_m": CELL_M, "base_level_decay": 0.0}
 
     return {
+        "run": {"lockstep": True, "participants": dict.fromkeys(MODULES, 1)},
         "sim": sim,
         "workspace": workspace,
         "codelets": correction["codelets"],
-        "procedural": {"mode": "lockstep"},
-        "motor": {"mode": "lockstep"},
     }
 
 

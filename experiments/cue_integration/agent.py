@@ -11,12 +11,8 @@ from cogmap.services import registry
 # Distances err anew with each look here, so each counts (eq. 1); the room is small, and so are its
 # places.
 SECTIONS: dict[str, dict[str, Any]] = {
-    "workspace": {
-        "mode": "lockstep",
-        "cell_m": 0.25,
-        "awaits_scan": False,
-        "awaits_competition": False,
-    },
+    "run": {"lockstep": True},
+    "workspace": {"cell_m": 0.25},
     "codelets": {"correlated_views": 1.0},
 }
 WORKER = "codelets-1"

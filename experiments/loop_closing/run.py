@@ -79,19 +79,13 @@ def sections(seed: int, method: str) -> Sections:
     """The configuration of every module, as for `cogmap run --config`, for one of METHODS."""
     step_m = SPEED_M_S / FRAME_HZ
     sim = {
-        "mode": "lockstep",
         "seed": seed,
         "noise": msgspec.structs.asdict(NOISE),
         "trajectory": trajectory(),
         "frame_hz": FRAME_HZ,
-        "awaits": dict.fromkeys(COGNITION, 1),
     }
 
-    workspace = {
-        "mode": "lockstep",
-        "cell_m": CELL_M,
-        "base_level_decay": 0.0,
-    }
+    workspace = {"cell_m": CELL_M, "base_level_decay": 0.0}
 
     codelets = {
         "correct": method,
@@ -103,11 +97,10 @@ def sections(seed: int, method: str) -> Sections:
     }
 
     return {
+        "run": {"lockstep": True, "participants": dict.fromkeys(MODULES, 1)},
         "sim": sim,
         "workspace": workspace,
         "codelets": codelets,
-        "procedural": {"mode": "lockstep"},
-        "motor": {"mode": "lockstep"},
     }
 
 

@@ -9,14 +9,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from cogmap.experiments.map_structure.boundaries import Boundaries
 from cogmap.experiments.map_structure.city import UNKNOWN, StructuredCity
 from cogmap.experiments.map_structure.functions import FUNCTIONS
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.parallel import Progress, parallel_map
-from cogmap.services.codelets.structure.config import Config
-from cogmap.services.codelets.structure.crossings import Boundaries
-from cogmap.services.codelets.structure.neighbours import neighbours
-from cogmap.services.codelets.structure.sub_maps import SubMaps
+from cogmap.services.codelets.sub_maps.config import Config
+from cogmap.services.codelets.sub_maps.neighbours import neighbours
+from cogmap.services.codelets.sub_maps.sub_maps import SubMaps
 
 NOISE_SD_M = 2.0
 REPEATS = 5

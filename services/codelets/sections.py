@@ -9,8 +9,8 @@ import msgspec
 from cogmap.services.codelets import config as common
 from cogmap.services.codelets.attention import config as attention
 from cogmap.services.codelets.planning import config as planning
-from cogmap.services.codelets.resolution import config as resolution
-from cogmap.services.codelets.structure import config as structure
+from cogmap.services.codelets.sub_maps import config as structure
+from cogmap.services.codelets.sub_maps import resolution_config as resolution
 
 SECTIONS: dict[str, type[msgspec.Struct]] = {
     common.SECTION: common.Config,

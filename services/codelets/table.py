@@ -22,21 +22,22 @@ from cogmap.services.codelets.attention import (
     place_lost,
     whereabouts,
 )
-from cogmap.services.codelets.correction import apply_correction, map_correction
-from cogmap.services.codelets.localization import landmarks, localization
+from cogmap.services.codelets.correction import (
+    apply_correction,
+    join_map,
+    map_correction,
+    sparse_path,
+)
+from cogmap.services.codelets.localization import landmarks, localization, object_place
 from cogmap.services.codelets.mapping import (
     boundary,
     charging_place,
     loop_detection,
-    object_place,
     path,
     road_place,
 )
 from cogmap.services.codelets.planning import route_plan
-from cogmap.services.codelets.recollection import join_map
-from cogmap.services.codelets.resolution import coarse_places, sub_map_places
-from cogmap.services.codelets.sparse import sparse_path
-from cogmap.services.codelets.structure import map_structure
+from cogmap.services.codelets.sub_maps import coarse_places, map_structure, sub_map_places
 
 CODELETS: tuple[Codelet, ...] = (
     apply_correction.CODELET,

@@ -9,6 +9,7 @@ import cv2
 import msgspec
 
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
@@ -54,7 +55,7 @@ class Perception:
         if self._in_lockstep and not self._primer.is_ready and not is_repeated:
             self._waiting = view
             return []
-        return self._perceived(view)
+        return self._perceive(view)
 
     def on_competition(self, competition: Competition) -> list[Message]:
         """Return the percepts of a view that has waited for this."""
@@ -64,13 +65,13 @@ class Perception:
             return []
 
         self._waiting = None
-        return self._perceived(view)
+        return self._perceive(view)
 
     def on_broadcast(self, broadcast: Broadcast) -> None:
-        """What was conscious primes a later view."""
+        """Prime a later view by what was conscious."""
         self._primer.on_broadcast(broadcast)
 
-    def _perceived(self, view: View) -> list[Message]:
+    def _perceive(self, view: View) -> list[Message]:
         arrays = view_arrays(view)
         if self._last_percepts is not None and _same_view(view, self._last_percepts):
             return [msgspec.structs.replace(self._last_percepts)]
@@ -104,7 +105,7 @@ class Perception:
         return [self._last_learned, percepts]
 
     def restore(self, messages: Iterable[Message]) -> None:
-        """Know again what was learned before a restart."""
+        """Recognize again what was learned before a restart."""
         for message in messages:
             if isinstance(message, Learned):
                 self._last_learned = message
@@ -125,12 +126,12 @@ class Perception:
         )
 
 
-def build(config: Config, instance: str) -> Module:
+def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
     """Build the extended PAM as a module. Raises ConfigError if its networks cannot be read."""
     cv2.setNumThreads(1)
-    segments_path = _path(config.segments_weights, segments.DEFAULT_PATH)
-    objects_path = _path(config.object_weights, objects.DEFAULT_PATH)
-    road_path = _path(config.road_weights, road.DEFAULT_PATH)
+    segments_path = Path(config.segments_weights or segments.DEFAULT_PATH)
+    objects_path = Path(config.object_weights or objects.DEFAULT_PATH)
+    road_path = Path(config.road_weights or road.DEFAULT_PATH)
     pam = ExtendedPam(
         config,
         segments.load(segments_path, config.processor),
@@ -138,7 +139,7 @@ def build(config: Config, instance: str) -> Module:
         road.load(road_path, config.processor),
     )
     primer = Primer(config.priming)
-    perception = Perception(pam, PlaceRecognizer(), primer, config.mode == "lockstep")
+    perception = Perception(pam, PlaceRecognizer(), primer, run.lockstep)
 
     published = (topics.PERCEPTS, topics.LEARNED)
     return (
@@ -154,7 +155,3 @@ def build(config: Config, instance: str) -> Module:
 
 def _same_view(view: View, message: View | Percepts | Learned) -> bool:
     return (view.stamp_ns, view.frame) == (message.stamp_ns, message.frame)
-
-
-def _path(given: str, default: Path) -> Path:
-    return Path(given) if given else default

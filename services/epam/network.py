@@ -1,4 +1,4 @@
-"""ONNX networks, run by ONNX Runtime, a pass on one thread; running them needs no torch."""
+"""ONNX networks, run by ONNX Runtime, each pass on one thread, without torch."""
 
 from __future__ import annotations
 
@@ -53,10 +53,16 @@ class Network:
 
         inputs = {received.name: tuple(received.shape) for received in self._session.get_inputs()}
         self._input_name = next(iter(inputs), "input")
-        _check(path, "takes", inputs, {self._input_name: input_shape})
-
-        shapes = {output.name: tuple(output.shape) for output in self._session.get_outputs()}
-        _check(path, "gives", shapes, output_shapes)
+        outputs = {output.name: tuple(output.shape) for output in self._session.get_outputs()}
+        for verb, found, expected in (
+            ("takes", inputs, {self._input_name: input_shape}),
+            ("gives", outputs, dict(output_shapes)),
+        ):
+            if found != expected:
+                raise ConfigError(
+                    f"{path} {verb} {found}, but {expected} is expected: "
+                    "train it again with cogmap train"
+                )
 
     def begin(self, values: Singles) -> Future[list[Singles]]:
         """Begin a pass that is computed beside what the caller does meanwhile; its outputs are
@@ -75,7 +81,7 @@ class Network:
 def provider_of(processor: Processor, installed: Collection[str]) -> str:
     """Return the one of ONNX Runtime's `installed` providers that runs networks on a processor.
 
-    Raises ConfigError where there is none.
+    Raises ConfigError if there is none.
     """
     if processor == "cpu":
         return CPU_PROVIDER
@@ -111,22 +117,10 @@ def _session(path: Path, processor: Processor) -> onnxruntime.InferenceSession:
             f"{path} does not hold a network ({error}): train it again with cogmap train"
         ) from error
 
-    # Where its driver is missing, ONNX Runtime takes the CPU without an error.
+    # If its driver is missing, ONNX Runtime takes the CPU without an error.
     if provider not in session.get_providers():
         raise ConfigError(
             f"{provider} does not start on this machine: install the driver that it needs, or set "
             "epam.processor to cpu"
         )
     return session
-
-
-def _check(
-    path: Path, verb: str, found: Mapping[str, Shape], expected: Mapping[str, Shape]
-) -> None:
-    """Raise ConfigError where the shapes of inputs or outputs differ from those expected."""
-    if found == dict(expected):
-        return
-    raise ConfigError(
-        f"{path} {verb} {found}, where {dict(expected)} is expected: "
-        "train it again with cogmap train"
-    )

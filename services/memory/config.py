@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 
@@ -16,13 +16,6 @@ Cycles = Annotated[int, msgspec.Meta(ge=1, le=100_000)]
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """What is stored and when, when a stored map is taken for the town around, and episodes."""
 
-    mode: Annotated[
-        Literal["lockstep", "real_time"],
-        msgspec.Meta(
-            description="lockstep: an offer is made in each cycle, which the next one waits for. "
-            "real_time: an offer is made where something is recalled."
-        ),
-    ] = "real_time"
     store_cycles: Annotated[
         Cycles,
         msgspec.Meta(

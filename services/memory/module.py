@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
@@ -27,10 +28,10 @@ class LongTermMemory:
     episodes, and offers a map, an episode and forgotten objects that it recalls.
     """
 
-    def __init__(self, config: Config, graph: Graph) -> None:
+    def __init__(self, config: Config, graph: Graph, run: Run) -> None:
         self._config = config
         self._graph = graph
-        self._is_lockstep = config.mode == "lockstep"
+        self._is_lockstep = run.lockstep
         self._gate = LockstepGate()
         self._spatial = SpatialMemory(config, graph)
         self._episodic = EpisodicMemory(config, graph)
@@ -149,10 +150,10 @@ class LongTermMemory:
         return [Offer(stamp_ns=stamp_ns, cycle=cycle, operations=operations)]
 
 
-def build(config: Config, instance: str) -> Module:
+def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
     """The module `memory`."""
     graph = Graph()
-    memory = LongTermMemory(config, graph)
+    memory = LongTermMemory(config, graph, run)
     published = (topics.STORED, topics.OFFER)
     return (
         Module("memory", instance)

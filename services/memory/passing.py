@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.polylines import distances_along
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import Object, PathColumn, look_of
@@ -72,8 +73,7 @@ def _along(way_m: Floats, at_m: Floats) -> Indices:
     if len(way_m) < 2:
         return np.zeros(0, np.int64)
 
-    steps_m = np.hypot(*np.diff(way_m, axis=0).T)
-    driven_m = np.concatenate([[0.0], steps_m.cumsum()])
+    driven_m = distances_along(way_m)
     offsets_m = at_m[:, None] - way_m
     apart_m = np.hypot(offsets_m[..., 0], offsets_m[..., 1])
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 
@@ -19,20 +19,6 @@ from cogmap.schemas.base import (
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """Sensory-motor memory: motor programs, and the reactive layers under them."""
 
-    mode: Annotated[
-        Literal["lockstep", "real_time"],
-        msgspec.Meta(
-            description="lockstep: a command waits for all that it depends on. "
-            "real_time: it does not."
-        ),
-    ] = "real_time"
-    makes_offers: Annotated[
-        bool,
-        msgspec.Meta(
-            description="In lockstep, whether it makes an offer in each cycle, perhaps of nothing, "
-            "which the next cycle waits for where workspace.offering names it."
-        ),
-    ] = False
     cruise_m_s: Annotated[
         PositiveSpeed, msgspec.Meta(description="Speed on a free straight, in m/s, above 0 to 100.")
     ] = 4.0

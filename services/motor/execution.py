@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cogmap.errors import MessageError
+from cogmap.runtime.run import Run
 from cogmap.schemas.cognition import Action, MotorProgram
 from cogmap.schemas.nodes import Plan, Self
 from cogmap.schemas.sensing import Pose, SpeedLimit
@@ -20,9 +21,9 @@ class Execution:
     before that of the next.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, run: Run) -> None:
         self._config = config
-        self._is_lockstep = config.mode == "lockstep"
+        self._is_lockstep = run.lockstep
         self._follow = FollowPlan(config)
         self._track = Track()
         self._program: Program = Halt(self._follow)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
@@ -48,9 +49,9 @@ class MotorModule:
     frame again that nobody answered, is answered at once.
     """
 
-    def __init__(self, config: Config, graph: Graph) -> None:
+    def __init__(self, config: Config, graph: Graph, run: Run) -> None:
         self._config = config
-        self._is_lockstep = config.mode == "lockstep"
+        self._is_lockstep = run.lockstep
         self._gate = LockstepGate()
         self._stuck = StuckDetector(config.stuck_m_s, config.stuck_after_s)
         self._escape = Escape(config)
@@ -58,7 +59,7 @@ class MotorModule:
         self._motor = SensoryMotorMemory(config, self._near)
 
         self._graph = graph
-        self._execution = Execution(config)
+        self._execution = Execution(config, run)
         self._is_resumed = False
         self._clear_m = math.inf
         self._newest_ns = 0
@@ -66,7 +67,6 @@ class MotorModule:
         self._answered: MotorCommand | None = None
         self._answered_cycle = 0
         self._sought: Goal | None = None
-        self._makes_offers = self._is_lockstep and config.makes_offers
 
     def restore(self, past: Iterable[Message]) -> None:
         """Resume the program that was executed last. A turn begins anew."""
@@ -182,8 +182,8 @@ class MotorModule:
         return started
 
     def _offers(self, command: MotorCommand) -> list[Message]:
-        """The goal that is sought, where the agent has none of that name that can be reached; where
-        offers are made in each cycle, perhaps none.
+        """The goal that is sought, where the agent has none of that name that can be reached; in
+        lockstep, where the next cycle waits for an offer, perhaps none.
         """
         goal = self._sought
         self._sought = None
@@ -191,7 +191,7 @@ class MotorModule:
         if goal is not None and self._is_open(goal):
             operations.append(goal)
 
-        if not operations and not self._makes_offers:
+        if not operations and not self._is_lockstep:
             return []
         cycle = self._graph.cycle
         return [Offer(stamp_ns=command.stamp_ns, cycle=cycle, operations=operations)]
@@ -263,10 +263,10 @@ def _self_pose(delta: Delta) -> Pose | None:
     return Pose(x_m=agent.x_m, y_m=agent.y_m, heading_rad=agent.heading_rad)
 
 
-def build(config: Config, instance: str) -> Module:
+def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
     """The module `motor`."""
     graph = Graph(with_places=False)
-    motor = MotorModule(config, graph)
+    motor = MotorModule(config, graph, run)
     replies = (topics.MOTOR_PROGRAM, topics.MOTOR_COMMAND, topics.OFFER)
     module = (
         Module("motor", instance)
@@ -277,7 +277,7 @@ def build(config: Config, instance: str) -> Module:
         .on(topics.ACTION, motor.on_action, emits=replies)
         .journaling(topics.MOTOR_PROGRAM, motor.restore, motor.executed, backfill=[topics.ACTION])
     )
-    if config.mode == "real_time":
+    if not run.lockstep:
         module.on(topics.CLOCK, motor.on_clock, emits=replies)
 
     return module

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import msgspec
 
@@ -12,13 +12,6 @@ from cogmap.schemas.base import PositiveMetres, Share
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """What the agent can do, and when it comes to mind."""
 
-    mode: Annotated[
-        Literal["lockstep", "real_time"],
-        msgspec.Meta(
-            description="lockstep: a broadcast waits for all that its behaviours depend on. "
-            "real_time: it does not."
-        ),
-    ] = "real_time"
     schemes: Annotated[
         str,
         msgspec.Meta(

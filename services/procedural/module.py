@@ -10,6 +10,7 @@ from msgspec.structs import replace
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Action, Behaviours, Broadcast
@@ -33,9 +34,9 @@ class ProceduralMemory:
     before that action was published: where a broadcast of it comes, the action was lost.
     """
 
-    def __init__(self, config: Config, graph: Graph) -> None:
+    def __init__(self, config: Config, graph: Graph, run: Run) -> None:
         self._config = config
-        self._is_lockstep = config.mode == "lockstep"
+        self._is_lockstep = run.lockstep
         self._graph = graph
         path = Path(config.schemes) if config.schemes else BUILT_IN
         self._schemes = load(path)
@@ -138,10 +139,10 @@ class ProceduralMemory:
         return self._last
 
 
-def build(config: Config, instance: str) -> Module:
+def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
     """The module `procedural`. Raises ConfigError where its schemes cannot be used."""
     graph = Graph(with_places=False)
-    memory = ProceduralMemory(config, graph)
+    memory = ProceduralMemory(config, graph, run)
     published = [topics.BEHAVIOURS]
     return (
         Module("procedural", instance)

@@ -7,42 +7,28 @@ from typing import Annotated
 import msgspec
 
 from cogmap.robot import NEAREST_DEPTH_M
-from cogmap.schemas.base import PositiveSeconds, Share
+from cogmap.schemas.base import Share
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Depth from stereo, the range scan, and the noise of the wheels (paper §5.4)."""
+    """Depth from stereo, and the noise of the wheels (paper §5.4)."""
 
     nearest_m: Annotated[
         float,
-        msgspec.Meta(
-            ge=0.1, le=100, description="Least depth that stereo matching finds, in m, 0.1 to 100."
-        ),
+        msgspec.Meta(ge=0.1, le=100, description="Least depth that stereo matching finds, in m."),
     ] = NEAREST_DEPTH_M
-    scan_sectors: Annotated[
-        int, msgspec.Meta(ge=1, le=1024, description="Sectors of the range scan, 1 to 1024.")
-    ] = 32
-    longest_gap_s: Annotated[
-        PositiveSeconds,
-        msgspec.Meta(
-            description="Time by which a stamp may be ahead of the odometry before it is refused, "
-            "in s, above 0 to 3600."
-        ),
-    ] = 60.0
     speed_noise: Annotated[
         Share,
-        msgspec.Meta(description="Standard deviation of the factor on the wheels' speed, 0 to 1."),
+        msgspec.Meta(description="Standard deviation of the factor on the wheels' speed."),
     ] = 0.1
     turn_noise: Annotated[
         Share,
-        msgspec.Meta(
-            description="Standard deviation of the factor on the wheels' turn rate, 0 to 1."
-        ),
+        msgspec.Meta(description="Standard deviation of the factor on the wheels' turn rate."),
     ] = 0.1
     drift_rad_per_sqrt_m: Annotated[
         Share,
         msgspec.Meta(
             description="Standard deviation of the wheels' heading after a metre, in rad, growing "
-            "with the root of the distance, 0 to 1."
+            "with the root of the distance."
         ),
     ] = 0.02

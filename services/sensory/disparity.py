@@ -9,11 +9,9 @@ towards whole pixels by up to 0.3: 8 % of the depth at 30 m. Gauss-Newton steps 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
 from cogmap.geometry.arrays import Bytes, Singles
 from cogmap.schemas.sensing import Calibration
@@ -50,33 +48,23 @@ class StereoMatcher:
         )
 
     def disparity_px(self, left: Bytes, right: Bytes, refine: bool = True) -> Singles:
-        """How far left each pixel of `left`, RGB (h, w, 3), is in `right`: float32 (h, w), 0 where
-        no match is sure.
+        """Return how far left each pixel of `left`, RGB (h, w, 3), is in `right`: float32 (h, w), 0
+        for pixels without a sure match.
         """
-        grey_left = cv2.cvtColor(left, cv2.COLOR_RGB2GRAY)
-        grey_right = cv2.cvtColor(right, cv2.COLOR_RGB2GRAY)
-        steps = self._match(grey_left, grey_right)
-        disparity_px = steps.astype(np.float32) / np.float32(STEPS_PER_PIXEL)
+        greys = [cv2.cvtColor(image, cv2.COLOR_RGB2GRAY) for image in (left, right)]
+
+        # The matcher leaves out a strip as wide as its search at the left border.
+        padding = (0, 0, self._disparities, 0)
+        padded = [cv2.copyMakeBorder(grey, *padding, cv2.BORDER_REPLICATE) for grey in greys]
+        steps = self._matcher.compute(*padded)[:, self._disparities :]
+        disparity_px: Singles = steps.astype(np.float32) / np.float32(STEPS_PER_PIXEL)
         if refine:
-            disparity_px = refined(disparity_px, _singles(grey_left), _singles(grey_right))
+            grey_left, grey_right = (grey.astype(np.float32) for grey in greys)
+            disparity_px = refined(disparity_px, grey_left, grey_right)
 
         is_unsure = (steps <= 0) | (disparity_px <= MIN_DISPARITY_PX)
         disparity_px[is_unsure] = 0.0
-
         return disparity_px
-
-    def _match(self, left: npt.NDArray[Any], right: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        """The matcher's fixed-point disparities. It leaves out a strip as wide as its search at the
-        left border, so both images are padded there.
-        """
-        padded_left = self._padded(left)
-        padded_right = self._padded(right)
-
-        padded = self._matcher.compute(padded_left, padded_right)
-        return padded[:, self._disparities :]
-
-    def _padded(self, grey: npt.NDArray[Any]) -> npt.NDArray[Any]:
-        return cv2.copyMakeBorder(grey, 0, 0, self._disparities, 0, cv2.BORDER_REPLICATE)
 
 
 class DepthFromStereo:
@@ -90,8 +78,8 @@ class DepthFromStereo:
         self._matcher = StereoMatcher(most_px)
 
     def depth_m(self, left: Bytes, right: Bytes) -> Singles:
-        """Depth along the optical axis for each pixel of `left`, float32 (h, w), 0 where no match
-        is sure.
+        """Return the depth along the optical axis of each pixel of `left`, float32 (h, w), 0 for
+        those without a sure match.
         """
         disparity_px = self._matcher.disparity_px(left, right)
         focal_baseline = np.float32(self._focal_baseline)
@@ -103,50 +91,32 @@ class DepthFromStereo:
 
 
 def refined(disparity_px: Singles, left: Singles, right: Singles) -> Singles:
-    """Disparity moved to where `left` and the shifted `right`, both grey, differ least around each
-    pixel.
+    """Return the disparities near `disparity_px` at which `left` and the shifted `right`, both
+    grey, differ least around each pixel.
 
     Brightness is compared without its local mean, since two cameras seldom agree on it.
     """
     height_px, width_px = disparity_px.shape
-    first_column = np.arange(width_px, dtype=np.float32)
-    first_row = np.arange(height_px, dtype=np.float32)
-    columns, rows = np.meshgrid(first_column, first_row)
-
-    left_slope = _slope(left)
-    right_slope = _slope(right)
-    least_px = disparity_px - MAX_STEP_PX
-    most_px = disparity_px + MAX_STEP_PX
+    columns, rows = np.meshgrid(
+        np.arange(width_px, dtype=np.float32), np.arange(height_px, dtype=np.float32)
+    )
+    # The change of brightness by column.
+    left_slope, right_slope = (
+        cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8) for grey in (left, right)
+    )
+    min_px = disparity_px - MAX_STEP_PX
+    max_px = disparity_px + MAX_STEP_PX
 
     result_px = disparity_px
     for _ in range(REFINEMENTS):
         matched = columns - result_px
         matched_slope = cv2.remap(right_slope, matched, rows, cv2.INTER_LINEAR)
         error = cv2.remap(right, matched, rows, cv2.INTER_LINEAR) - left
+        error -= cv2.boxFilter(error, -1, WINDOW_PX)
 
-        step_px = _step_px(0.5 * (left_slope + matched_slope), error)
-        result_px = np.clip(result_px + step_px, least_px, most_px)
+        slope = 0.5 * (left_slope + matched_slope)
+        curvature = cv2.boxFilter(slope * slope, -1, WINDOW_PX) + NOISE_GRADIENT
+        step_px = cv2.boxFilter(slope * error, -1, WINDOW_PX) / curvature
+        result_px = np.clip(result_px + step_px, min_px, max_px)
 
     return result_px
-
-
-def _step_px(slope: Singles, error: Singles) -> Singles:
-    """The Gauss-Newton step of each pixel, by the error around it beyond its local mean."""
-    error -= _local_mean(error)
-
-    curvature = _local_mean(slope * slope) + NOISE_GRADIENT
-    return _local_mean(slope * error) / curvature
-
-
-def _slope(grey: Singles) -> Singles:
-    """The change of brightness by column."""
-    slope = cv2.Sobel(grey, cv2.CV_32F, 1, 0, ksize=3, scale=1 / 8)
-    return _singles(slope)
-
-
-def _local_mean(values: Singles) -> Singles:
-    return _singles(cv2.boxFilter(values, -1, WINDOW_PX))
-
-
-def _singles(values: npt.NDArray[Any]) -> Singles:
-    return values.astype(np.float32, copy=False)

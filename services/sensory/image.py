@@ -1,4 +1,4 @@
-"""Images out of messages."""
+"""Reads images from messages."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from cogmap.schemas.sensing import Calibration
 
 
 def colour_image(array: Array, calibration: Calibration, name: str) -> Bytes:
-    """The RGB image in `array`, (height, width, 3). Raises MessageError where it is not of the
+    """Return the RGB image in `array`, (height, width, 3). Raises MessageError if it is not of the
     calibration's size.
     """
     expected = (calibration.height_px, calibration.width_px, 3)

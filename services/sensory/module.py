@@ -7,7 +7,6 @@ from collections.abc import Iterable, Iterator
 import cv2
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 from cogmap.schemas.array import Array
@@ -25,8 +24,10 @@ from cogmap.services.sensory.wheels import WheelNoise, fuse
 __all__ = ["Config", "SensoryMemory", "build"]
 
 # OpenCV divides an image in the same way for any number of threads, so results do not depend on it.
-# While a view is made, all other modules wait for it.
+# All other modules wait while a view is made.
 THREADS = 2
+# Of the range scan: 2.3 degrees each of the simulated camera's 75.
+SCAN_SECTORS = 32
 
 
 class SensoryMemory:
@@ -41,12 +42,8 @@ class SensoryMemory:
     def __init__(self, config: Config) -> None:
         cv2.setNumThreads(THREADS)
         self._config = config
-        self._odometry = OdometryBuffer(config.longest_gap_s)
-        self._noise = WheelNoise(
-            config.speed_noise,
-            config.turn_noise,
-            config.drift_rad_per_sqrt_m,
-        )
+        self._odometry = OdometryBuffer()
+        self._noise = WheelNoise(config.speed_noise, config.turn_noise, config.drift_rad_per_sqrt_m)
         self._visual_odometry = VisualOdometry()
         self._depth: tuple[Calibration, DepthFromStereo] | None = None
         self._waiting: StereoFrame | None = None
@@ -54,14 +51,14 @@ class SensoryMemory:
         self._answer: list[Message] = []
 
     def on_frame(self, frame: StereoFrame) -> Iterable[Message]:
-        """Receive a frame. Raises MessageError where its images do not fit its calibration."""
+        """Receive a frame. Raises MessageError if its images do not fit its calibration."""
         colour_image(frame.left, frame.calibration, "left")
         colour_image(frame.right, frame.calibration, "right")
         rectification(frame.calibration)
         self._odometry.check_near(frame.stamp_ns, "frame")
 
         if self._last_ns is not None and frame.stamp_ns <= self._last_ns:
-            return self._repeated(frame)
+            return self._answer if frame.stamp_ns == self._last_ns else []
 
         if self._waiting is None or frame.stamp_ns > self._waiting.stamp_ns:
             self._waiting = frame
@@ -69,15 +66,11 @@ class SensoryMemory:
         return self._emit()
 
     def on_odometry(self, odometry: Odometry) -> Iterable[Message]:
-        """Receive odometry. Raises MessageError where no wheels turn so fast or its stamp is far
+        """Receive odometry. Raises MessageError if no wheels turn so fast or its stamp is far
         ahead.
         """
         self._odometry.add(odometry)
         return self._emit()
-
-    def _repeated(self, frame: StereoFrame) -> list[Message]:
-        """The answer to the last frame; none to an older one."""
-        return self._answer if frame.stamp_ns == self._last_ns else []
 
     def _emit(self) -> Iterator[Message]:
         frame = self._waiting
@@ -89,7 +82,14 @@ class SensoryMemory:
         view = self._view(frame)
         yield view
 
-        ranges = self._ranges(view)
+        depth_m = view.depth_m.numpy().astype(np.float32, copy=False)
+        bearing_rad, range_m = scan(depth_m, view.calibration, SCAN_SECTORS)
+        ranges = RangeScan(
+            stamp_ns=view.stamp_ns,
+            frame=view.frame,
+            bearing_rad=Array.of(bearing_rad),
+            range_m=Array.of(range_m),
+        )
         yield ranges
 
         motion = self._self_motion(frame, view)
@@ -104,22 +104,16 @@ class SensoryMemory:
         since_ns = self._last_ns
         self._last_ns = frame.stamp_ns
 
+        image = view.image.numpy().astype(np.uint8, copy=False)
+        depth_m = view.depth_m.numpy().astype(np.float32)
+        wheels = self._noise.total(rows)
+        motion = self._visual_odometry.update(image, depth_m, view.calibration, wheels)
         return SelfMotion(
             stamp_ns=frame.stamp_ns,
             frame=frame.frame,
             since_ns=since_ns,
-            motions=Array.of(self._motions(rows, view)),
+            motions=Array.of(fuse(rows, motion, wheels)),
         )
-
-    def _motions(self, rows: Floats, view: View) -> Floats:
-        """(n, 5): the rows of odometry up to `view`, fused with what is seen of the motion."""
-        image = view.image.numpy().astype(np.uint8, copy=False)
-        depth_m = view.depth_m.numpy().astype(np.float32)
-
-        wheels = self._noise.total(rows)
-        motion = self._visual_odometry.update(image, depth_m, view.calibration, wheels)
-
-        return fuse(rows, motion, wheels)
 
     def _view(self, frame: StereoFrame) -> View:
         rectified = rectification(frame.calibration)
@@ -129,7 +123,10 @@ class SensoryMemory:
             colour_image(frame.right, frame.calibration, "right"),
         )
 
-        depth_m = self._matcher(calibration).depth_m(left, right)
+        if self._depth is None or self._depth[0] != calibration:
+            self._depth = (calibration, DepthFromStereo(calibration, self._config.nearest_m))
+        _, matcher = self._depth
+        depth_m = matcher.depth_m(left, right)
         return View(
             stamp_ns=frame.stamp_ns,
             frame=frame.frame,
@@ -138,31 +135,13 @@ class SensoryMemory:
             calibration=calibration,
         )
 
-    def _ranges(self, view: View) -> RangeScan:
-        depth_m = view.depth_m.numpy().astype(np.float32, copy=False)
-        bearing_rad, range_m = scan(depth_m, view.calibration, self._config.scan_sectors)
-        return RangeScan(
-            stamp_ns=view.stamp_ns,
-            frame=view.frame,
-            bearing_rad=Array.of(bearing_rad),
-            range_m=Array.of(range_m),
-        )
-
-    def _matcher(self, calibration: Calibration) -> DepthFromStereo:
-        if self._depth is None or self._depth[0] != calibration:
-            nearest_m = self._config.nearest_m
-            matcher = DepthFromStereo(calibration, nearest_m)
-            self._depth = (calibration, matcher)
-
-        return self._depth[1]
-
 
 def build(config: Config, instance: str) -> Module:
-    """The module `sensory`."""
+    """Build the module `sensory`."""
     memory = SensoryMemory(config)
     emits = (topics.SELF_MOTION, topics.SCAN, topics.VIEW)
-
-    module = Module("sensory", instance)
-    module.on(topics.STEREO, memory.on_frame, emits=emits)
-
-    return module.on(topics.ODOMETRY, memory.on_odometry, emits=emits)
+    return (
+        Module("sensory", instance)
+        .on(topics.STEREO, memory.on_frame, emits=emits)
+        .on(topics.ODOMETRY, memory.on_odometry, emits=emits)
+    )

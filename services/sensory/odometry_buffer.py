@@ -11,18 +11,19 @@ from cogmap.schemas.sensing import Odometry
 NS_PER_S = 1_000_000_000
 MAX_SPEED_M_S = 100.0
 MAX_TURN_RATE_RAD_S = 100.0
+# A stamp that is further ahead of the odometry is a mistake.
+MAX_AHEAD_NS = 60 * NS_PER_S
 
 
 class OdometryBuffer:
     """Odometry that no view has accounted for yet, in order of time."""
 
-    def __init__(self, longest_gap_s: float) -> None:
-        self._longest_gap_ns = int(longest_gap_s * NS_PER_S)
+    def __init__(self) -> None:
         self._rows: list[Odometry] = []
         self.newest_ns: int | None = None
 
     def add(self, row: Odometry) -> None:
-        """Add `row`; one that is no newer than the last is ignored. Raises MessageError where it is
+        """Add `row`; one that is no newer than the last is ignored. Raises MessageError if it is
         too fast or too far ahead.
         """
         speed_m_s = row.speed_m_s
@@ -38,10 +39,10 @@ class OdometryBuffer:
             self.newest_ns = row.stamp_ns
 
     def check_near(self, stamp_ns: int, name: str) -> None:
-        """Raise MessageError where `stamp_ns` is so far ahead that everything up to it would be
+        """Raise MessageError if `stamp_ns` is so far ahead that everything up to it would be
         ignored from then on.
         """
-        if self.newest_ns is None or stamp_ns <= self.newest_ns + self._longest_gap_ns:
+        if self.newest_ns is None or stamp_ns <= self.newest_ns + MAX_AHEAD_NS:
             return
 
         ahead_s = (stamp_ns - self.newest_ns) / NS_PER_S
@@ -50,31 +51,19 @@ class OdometryBuffer:
         )
 
     def covers(self, stamp_ns: int) -> bool:
-        """Whether everything up to `stamp_ns` has come."""
+        """Return true if everything up to `stamp_ns` has come."""
         return self.newest_ns is not None and self.newest_ns >= stamp_ns
 
     def take(self, until_ns: int) -> tuple[int | None, Floats]:
-        """Remove the odometry up to `until_ns`: when it began (None where there is none), and
-        (n, 3) rows of speed, turn rate and duration.
+        """Remove the odometry up to `until_ns`, and return when it began (None if there is none),
+        and (n, 3) rows of speed, turn rate and duration.
         """
         taken = [row for row in self._rows if row.stamp_ns <= until_ns]
         self._rows = self._rows[len(taken) :]
+        measured = [(row.speed_m_s, row.turn_rate_rad_s, row.dt_s) for row in taken]
+        rows = np.array(measured, np.float64).reshape(-1, 3)
         if not taken:
-            return None, _rows(taken)
+            return None, rows
 
-        return _began_ns(taken[0]), _rows(taken)
-
-
-def _rows(measured: list[Odometry]) -> Floats:
-    """(n, 3): speed, turn rate and duration."""
-    rows = []
-    for row in measured:
-        rows.append((row.speed_m_s, row.turn_rate_rad_s, row.dt_s))
-
-    return np.array(rows, np.float64).reshape(-1, 3)
-
-
-def _began_ns(row: Odometry) -> int:
-    duration_ns = round(row.dt_s * NS_PER_S)
-
-    return max(0, row.stamp_ns - duration_ns)
+        duration_ns = round(taken[0].dt_s * NS_PER_S)
+        return max(0, taken[0].stamp_ns - duration_ns), rows

@@ -10,20 +10,20 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Bytes, Floats, Singles
+from cogmap.geometry.arrays import Bytes, Singles
 from cogmap.schemas.sensing import Calibration
 
 Maps = tuple[Singles, Singles]
 
 MIN_FOCAL_PX = 1.0
 MAX_FOCAL_PX = 1e5
-_STRAIGHT = (0.0, 0.0, 0.0)
-_UNDISTORTED = (0.0, 0.0, 0.0, 0.0, 0.0)
+STRAIGHT = (0.0, 0.0, 0.0)
+UNDISTORTED = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
 class Rectification:
-    """The look-up maps of one calibration, each a pair for `cv2.remap`; None where the images are
+    """The look-up maps of one calibration, each a pair for `cv2.remap`; None if the images are
     rectified already.
 
     `calibration` is that of the rectified pair. The baseline runs along the left camera's x axis by
@@ -36,17 +36,16 @@ class Rectification:
     right_maps: Maps | None
 
     def apply(self, left: Bytes, right: Bytes) -> tuple[Bytes, Bytes]:
-        """The rectified images, uint8 of the same shapes, black where no camera saw anything."""
+        """Return the rectified images, uint8 of the same shapes, black outside the view."""
         rectified_left = _remap(left, self.left_maps)
         rectified_right = _remap(right, self.right_maps)
         return rectified_left, rectified_right
 
 
 def rectification(calibration: Calibration) -> Rectification:
-    """The rectification for `calibration`. Raises MessageError where it describes no camera."""
-    least_px = min(calibration.fx_px, calibration.fy_px)
-    most_px = max(calibration.fx_px, calibration.fy_px)
-    if least_px < MIN_FOCAL_PX or most_px > MAX_FOCAL_PX:
+    """Return the rectification for `calibration`. Raises MessageError if it describes no camera."""
+    focal_px = (calibration.fx_px, calibration.fy_px)
+    if min(focal_px) < MIN_FOCAL_PX or max(focal_px) > MAX_FOCAL_PX:
         raise MessageError("calibration: the focal lengths must be between 1 and 100000 pixels")
 
     if calibration.cx_px > calibration.width_px or calibration.cy_px > calibration.height_px:
@@ -60,11 +59,11 @@ def _cached(encoded: bytes) -> Rectification:
     calibration = msgspec.msgpack.decode(encoded, type=Calibration)
     rectified = msgspec.structs.replace(
         calibration,
-        right_rotation_rad=_STRAIGHT,
-        left_distortion=_UNDISTORTED,
-        right_distortion=_UNDISTORTED,
+        right_rotation_rad=STRAIGHT,
+        left_distortion=UNDISTORTED,
+        right_distortion=UNDISTORTED,
     )
-    left = _maps(calibration, calibration.left_distortion, _STRAIGHT)
+    left = _maps(calibration, calibration.left_distortion, STRAIGHT)
     right = _maps(calibration, calibration.right_distortion, calibration.right_rotation_rad)
 
     return Rectification(rectified, left, right)
@@ -75,10 +74,16 @@ def _maps(
     distortion: tuple[float, ...],
     rotation_rad: tuple[float, float, float],
 ) -> Maps | None:
-    if distortion == _UNDISTORTED and rotation_rad == _STRAIGHT:
+    if distortion == UNDISTORTED and rotation_rad == STRAIGHT:
         return None
 
-    camera = _camera_matrix(calibration)
+    camera = np.array(
+        [
+            [calibration.fx_px, 0.0, calibration.cx_px],
+            [0.0, calibration.fy_px, calibration.cy_px],
+            [0.0, 0.0, 1.0],
+        ]
+    )
     to_left, _ = cv2.Rodrigues(np.array(rotation_rad))
     columns, rows = cv2.initUndistortRectifyMap(
         camera,
@@ -92,17 +97,6 @@ def _maps(
         raise MessageError("calibration: its distortion maps pixels to infinity")
 
     return columns.astype(np.float32, copy=False), rows.astype(np.float32, copy=False)
-
-
-def _camera_matrix(calibration: Calibration) -> Floats:
-    """(3, 3): what takes the camera's axes to its pixels."""
-    return np.array(
-        [
-            [calibration.fx_px, 0.0, calibration.cx_px],
-            [0.0, calibration.fy_px, calibration.cy_px],
-            [0.0, 0.0, 1.0],
-        ]
-    )
 
 
 def _remap(image: Bytes, maps: Maps | None) -> Bytes:

@@ -1,4 +1,4 @@
-"""What a camera sees, and where it was in the image before the robot moved."""
+"""Projects a view's pixels to points, and points to the pixels that showed them before a motion."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ MIN_AHEAD_M = 0.3
 
 
 class Points(NamedTuple):
-    """Where points are from the robot's origin, in m at the camera's height: arrays of one shape,
-    or of shapes that broadcast.
+    """Positions of points relative to the robot's origin, in m at the camera's height: arrays of
+    one shape, or of shapes that broadcast.
     """
 
     ahead_m: Floats
@@ -24,7 +24,7 @@ class Points(NamedTuple):
 
 
 def points_at(pixels: Singles, depth_m: Singles, calibration: Calibration) -> Points:
-    """The (n,) points at (n, 2) pixels of an image whose depth is `depth_m` (h, w)."""
+    """Return the (n,) points at (n, 2) pixels of an image whose depth is `depth_m` (h, w)."""
     nearest_column, nearest_row = np.rint(pixels).astype(int).T
     ahead_m = depth_m[nearest_row, nearest_column]
 
@@ -33,7 +33,7 @@ def points_at(pixels: Singles, depth_m: Singles, calibration: Calibration) -> Po
 
 
 def surface(depth_m: Singles, calibration: Calibration) -> Points:
-    """The (h, w) points that all pixels of an image with the depth `depth_m` (h, w) show."""
+    """Return the (h, w) points that all pixels of an image with the depth `depth_m` (h, w) show."""
     height_px, width_px = depth_m.shape
     column = np.arange(width_px, dtype=np.float32)
     row = np.arange(height_px, dtype=np.float32)
@@ -55,13 +55,16 @@ def _points(column: Singles, row: Singles, ahead_m: Floats, calibration: Calibra
 def project_back(
     points: Points, motion: npt.NDArray[np.float64], calibration: Calibration
 ) -> tuple[Floats, Floats]:
-    """The columns and rows in pixels of `points` as they were before `motion` (5, ...): distance,
-    sideways, turn, pitch, roll. Several motions broadcast with the points.
+    """Return the columns and rows in pixels of `points` as they were before `motion` (5, ...):
+    distance, sideways, turn, pitch, roll. Several motions broadcast with the points.
 
     The motion is an arc: it leads in the direction half-way through the turn.
     """
     distance_m, sideways_m, turn_rad, pitch_rad, roll_rad = motion
-    ahead_m, left_m = _turned(points.ahead_m, points.left_m, turn_rad)
+    cos = np.cos(turn_rad)
+    sin = np.sin(turn_rad)
+    ahead_m = cos * points.ahead_m - sin * points.left_m
+    left_m = sin * points.ahead_m + cos * points.left_m
 
     half_turn_rad = turn_rad / 2
     cos = np.cos(half_turn_rad)
@@ -78,13 +81,3 @@ def project_back(
     column_px = tilted_x * calibration.fx_px + calibration.cx_px
     row_px = tilted_y * calibration.fy_px + calibration.cy_px
     return column_px, row_px
-
-
-def _turned(ahead_m: Floats, left_m: Floats, turn_rad: Floats) -> tuple[Floats, Floats]:
-    """What is ahead and to the left, turned counter-clockwise."""
-    cos = np.cos(turn_rad)
-    sin = np.sin(turn_rad)
-
-    turned_ahead_m = cos * ahead_m - sin * left_m
-    turned_left_m = sin * ahead_m + cos * left_m
-    return turned_ahead_m, turned_left_m

@@ -1,9 +1,9 @@
-"""Visual odometry: how far the robot moved and turned between two views.
+"""Visual odometry: the robot's distance and turn between two views.
 
 The last view is redrawn as it should look now, by the depth of the new view and the wheels' motion.
 Corners are tracked between the two, which look alike, so that no patch is stretched by coming
-nearer. The planar motion that explains where the corners were before is then solved for, with the
-wheels' as its prior (robust Gauss-Newton).
+nearer. The planar motion that explains the corners' positions in the last view is then solved for,
+with the wheels' as its prior (robust Gauss-Newton).
 """
 
 from __future__ import annotations
@@ -58,10 +58,13 @@ class Scale:
         self._information = 1 / SCALE_SD**2
 
     def correct(self, seen: Motion, wheels: Motion) -> Motion:
-        """What was seen, in the wheels' metres; where the robot moves, both improve the scale."""
+        """Return what was seen, in the wheels' metres; while moving, both improve the scale."""
         shortest_m = min(abs(seen.distance_m), abs(wheels.distance_m))
         if shortest_m > MIN_SCALED_M and wheels.distance_sd_m > 0.0:
-            self._update(seen.distance_m, wheels)
+            information = (seen.distance_m / wheels.distance_sd_m) ** 2
+            self._information += information
+            innovation = wheels.distance_m / seen.distance_m - self._mean
+            self._mean += innovation * information / self._information
 
         scale_sd_m = seen.distance_m / math.sqrt(self._information)
 
@@ -71,13 +74,6 @@ class Scale:
             distance_sd_m=math.hypot(seen.distance_sd_m, scale_sd_m),
             turn_sd_rad=seen.turn_sd_rad,
         )
-
-    def _update(self, seen_m: float, wheels: Motion) -> None:
-        information = (seen_m / wheels.distance_sd_m) ** 2
-        self._information += information
-
-        innovation = wheels.distance_m / seen_m - self._mean
-        self._mean += innovation * information / self._information
 
 
 class VisualOdometry:
@@ -90,8 +86,8 @@ class VisualOdometry:
     def update(
         self, image: Bytes, depth_m: Singles, calibration: Calibration, wheels: Motion
     ) -> Motion:
-        """The motion since the last view, by the wheels and the views; by the wheels alone where
-        the views do not suffice.
+        """Return the motion since the last view, by the wheels and the views; by the wheels alone
+        if the views do not suffice.
 
         `image` is RGB (h, w, 3); `depth_m` (h, w) is its depth along the optical axis, 0 where it
         is unknown.
@@ -102,14 +98,22 @@ class VisualOdometry:
         if last is None or last.shape != grey.shape:
             return wheels
 
-        corners_px = _corners(grey, depth_m)
-        if len(corners_px) < MIN_TRACKED:
+        # Corners with a depth that is known well.
+        mask = ((depth_m > MIN_DEPTH_M) & (depth_m < MAX_DEPTH_M)).astype(np.uint8)
+        found = cv2.goodFeaturesToTrack(grey, CORNERS, 0.01, 7, mask=mask)
+        if found is None or len(found) < MIN_TRACKED:
             return wheels
 
+        corners_px = np.asarray(found, np.float32).reshape(-1, 2)
         pair = _Pair(last, grey, depth_m, calibration)
         for turn_rad in (wheels.turn_rad, 0.0):
             guess = np.array([wheels.distance_m, 0.0, turn_rad, 0.0, 0.0])
-            seen = _estimate(pair, corners_px, guess, wheels)
+            before_px, is_found = _track_back(pair, corners_px, guess)
+            if is_found.sum() < MIN_TRACKED:
+                continue
+
+            points = points_at(corners_px[is_found], depth_m, calibration)
+            seen = _solve(points, before_px[is_found], guess, wheels, calibration)
             if seen is not None:
                 return self._scale.correct(seen, wheels)
 
@@ -125,50 +129,19 @@ class _Pair(NamedTuple):
     calibration: Calibration
 
 
-class _Tracks(NamedTuple):
-    """Where (n,) corners were in the last view, (n, 2), and which were found."""
-
-    before_px: Floats
-    is_found: Booleans
-
-
-class _Fit(NamedTuple):
-    """Residuals (n, 2) in pixels, their Jacobian (n, 2, 5) and their robust weights (n,)."""
-
-    residual_px: Floats
-    jacobian: Floats
-    weight: Floats
-
-
-def _estimate(pair: _Pair, corners_px: Singles, guess: Floats, wheels: Motion) -> Motion | None:
-    """The motion seen, searched from `guess`; None where too few corners are tracked or agree."""
-    tracks = _track_back(pair, corners_px, guess)
-    if tracks.is_found.sum() < MIN_TRACKED:
-        return None
-
-    found_px = corners_px[tracks.is_found]
-    points = points_at(found_px, pair.depth_m, pair.calibration)
-    before_px = tracks.before_px[tracks.is_found]
-
-    return _solve(points, before_px, guess, wheels, pair.calibration)
-
-
-def _corners(grey: Bytes, depth_m: Singles) -> Singles:
-    """(n, 2) pixels that can be tracked and whose depth is known well."""
-    is_far_enough = depth_m > MIN_DEPTH_M
-    is_near_enough = depth_m < MAX_DEPTH_M
-    mask = (is_far_enough & is_near_enough).astype(np.uint8)
-
-    found = cv2.goodFeaturesToTrack(grey, CORNERS, 0.01, 7, mask=mask)
-    if found is None:
-        return np.empty((0, 2), np.float32)
-
-    return np.asarray(found, np.float32).reshape(-1, 2)
-
-
-def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> _Tracks:
-    """Where the corners of the new view were in the last one."""
-    redrawn, before = _redraw(pair, guess)
+def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> tuple[Floats, Booleans]:
+    """The positions (n, 2) of the new view's corners in the last one, and which were found (n,)."""
+    # The last view as it would look after the motion `guess`, and where each of its pixels was.
+    depth_m = np.where(pair.depth_m > 0, pair.depth_m, HORIZON_M).astype(np.float32)
+    points = surface(depth_m, pair.calibration)
+    before = np.dstack(project_back(points, guess, pair.calibration)).astype(np.float32)
+    redrawn = cv2.remap(
+        pair.last,
+        before[..., 0],
+        before[..., 1],
+        cv2.INTER_LINEAR,
+        borderMode=cv2.BORDER_REPLICATE,
+    )
 
     anywhere = np.zeros_like(corners_px)
     tracked_px, is_tracked, _ = cv2.calcOpticalFlowPyrLK(
@@ -189,38 +162,11 @@ def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> _Tracks:
         borderMode=cv2.BORDER_REPLICATE,
     )[0]
 
-    is_inside = _is_inside(np.asarray(before_px, np.float32), pair.new.shape)
+    height_px, width_px = pair.new.shape
+    last_px = (width_px - 1, height_px - 1)
+    is_inside = ((before_px >= 0) & (before_px <= last_px)).all(axis=1)
     is_found = np.asarray(is_tracked[:, 0], bool) & is_inside
-    return _Tracks(np.asarray(before_px, np.float64), is_found)
-
-
-def _is_inside(pixels: Singles, shape: tuple[int, ...]) -> Booleans:
-    """(n,): which of (n, 2) pixels, column and row, lie in an image of that shape (h, w)."""
-    height_px, width_px = shape
-    last = (width_px - 1, height_px - 1)
-
-    is_inside = (pixels >= 0) & (pixels <= last)
-    return np.asarray(is_inside.all(axis=1))
-
-
-def _redraw(pair: _Pair, guess: Floats) -> tuple[Bytes, Singles]:
-    """The last view as it would look after the motion `guess`, and where each of its pixels was,
-    (h, w, 2).
-    """
-    depth_m = np.where(pair.depth_m > 0, pair.depth_m, HORIZON_M).astype(np.float32)
-    points = surface(depth_m, pair.calibration)
-    column_px, row_px = project_back(points, guess, pair.calibration)
-
-    before = np.dstack([column_px, row_px]).astype(np.float32)
-    redrawn = cv2.remap(
-        pair.last,
-        before[..., 0],
-        before[..., 1],
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-
-    return np.asarray(redrawn, np.uint8), before
+    return np.asarray(before_px, np.float64), is_found
 
 
 def _solve(
@@ -230,10 +176,29 @@ def _solve(
     wheels: Motion,
     calibration: Calibration,
 ) -> Motion | None:
-    """The motion that best explains where the points were, from `guess`; None where too few agree
-    on it.
+    """The motion that best explains the points' earlier positions, by Gauss-Newton from `guess`;
+    None if too few agree on it.
     """
-    motion, information = _most_likely(points, before_px, guess, wheels, calibration)
+    # The wheels' motion is the prior, and that the robot hardly moves sideways or tilts.
+    expected = np.array([wheels.distance_m, 0.0, wheels.turn_rad, 0.0, 0.0])
+    sds = [wheels.distance_sd_m, SIDEWAYS_SD_M, wheels.turn_sd_rad, TILT_SD_RAD, TILT_SD_RAD]
+    prior = np.diag(1 / np.maximum(sds, 1e-6) ** 2)
+
+    motion = guess.copy()
+    information = prior
+    for _ in range(ITERATIONS):
+        residual_px, jacobian = _linearize(points, before_px, motion, calibration)
+
+        # Geman-McClure's weights, over the variance of a track.
+        squared = (np.hypot(residual_px[:, 0], residual_px[:, 1]) / OUTLIER_PX) ** 2
+        weight: Floats = 1 / (1 + squared) ** 2 / TRACK_SD_PX**2
+
+        information = prior + np.einsum("nik,n,nil->kl", jacobian, weight, jacobian)
+        pull = np.einsum("nik,n,ni->k", jacobian, weight, residual_px)
+        step = np.linalg.solve(information, pull - prior @ (motion - expected))
+        motion = motion + step
+        if np.abs(step).max() < CONVERGED:
+            break
 
     residual_px = before_px - np.column_stack(project_back(points, motion, calibration))
     distance_px = np.hypot(*residual_px.T)
@@ -241,9 +206,7 @@ def _solve(
         return None
 
     inflation = max(1.0, float(np.median(distance_px)) / TRACK_SD_PX)
-    variances = np.diag(np.linalg.inv(information))
-    deviation = inflation * np.sqrt(variances)
-
+    deviation = inflation * np.sqrt(np.diag(np.linalg.inv(information)))
     return Motion(
         distance_m=float(motion[0]),
         turn_rad=float(motion[2]),
@@ -252,66 +215,15 @@ def _solve(
     )
 
 
-def _most_likely(
-    points: Points,
-    before_px: Floats,
-    guess: Floats,
-    wheels: Motion,
-    calibration: Calibration,
+def _linearize(
+    points: Points, before_px: Floats, motion: Floats, calibration: Calibration
 ) -> tuple[Floats, Floats]:
-    """The motion (5,) by Gauss-Newton from `guess`, and its information (5, 5)."""
-    prior = _prior(wheels)
-    expected = np.array([wheels.distance_m, 0.0, wheels.turn_rad, 0.0, 0.0])
-
-    motion = guess.copy()
-    information = prior
-    for _ in range(ITERATIONS):
-        fit = _linearize(points, before_px, motion, calibration)
-        information = prior + np.einsum("nik,n,nil->kl", fit.jacobian, fit.weight, fit.jacobian)
-        pull = np.einsum("nik,n,ni->k", fit.jacobian, fit.weight, fit.residual_px)
-
-        gradient = pull - prior @ (motion - expected)
-        step = np.linalg.solve(information, gradient)
-        motion = motion + step
-        if np.abs(step).max() < CONVERGED:
-            break
-
-    return motion, information
-
-
-def _prior(wheels: Motion) -> Floats:
-    """The information of the wheels' motion, and that the robot hardly moves sideways or tilts."""
-    deviations = [
-        wheels.distance_sd_m,
-        SIDEWAYS_SD_M,
-        wheels.turn_sd_rad,
-        TILT_SD_RAD,
-        TILT_SD_RAD,
-    ]
-    return np.diag(1 / np.maximum(deviations, 1e-6) ** 2)
-
-
-def _linearize(points: Points, before_px: Floats, motion: Floats, calibration: Calibration) -> _Fit:
-    """Residuals at `motion`, their Jacobian by differences, and their weights."""
-    at_rest = np.zeros(5)
-    differences = np.vstack([at_rest, np.diag(np.full(5, DIFFERENCE))])
+    """Residuals (n, 2) in pixels at `motion`, and their Jacobian (n, 2, 5) by differences."""
+    differences = np.vstack([np.zeros(5), np.diag(np.full(5, DIFFERENCE))])
     motions = motion + differences
-
     column_px, row_px = project_back(points, motions.T[..., None], calibration)
     projected_px = np.stack([column_px, row_px], axis=2)
 
     predicted_px = projected_px[0]
     changes = (projected_px[1:] - predicted_px) / DIFFERENCE
-    jacobian = np.ascontiguousarray(np.moveaxis(changes, 0, 2))
-
-    residual_px = before_px - predicted_px
-    return _Fit(residual_px, jacobian, _robust_weight(residual_px))
-
-
-def _robust_weight(residual_px: Floats) -> Floats:
-    """Geman-McClure weights (n,) of (n, 2) residuals, over the variance of a track."""
-    distance_px = np.hypot(residual_px[:, 0], residual_px[:, 1])
-    squared = (distance_px / OUTLIER_PX) ** 2
-
-    weight: Floats = 1 / (1 + squared) ** 2 / TRACK_SD_PX**2
-    return weight
+    return before_px - predicted_px, np.ascontiguousarray(np.moveaxis(changes, 0, 2))

@@ -23,7 +23,7 @@ class WheelNoise:
     drift_rad_per_sqrt_m: float
 
     def total(self, rows: Floats) -> Motion:
-        """The sum of (n, 3) rows of speed, turn rate and duration."""
+        """Return the sum of (n, 3) rows of speed, turn rate and duration."""
         speed_m_s, turn_rate_rad_s, dt_s = rows.T
         distance_m = speed_m_s * dt_s
         turn_rad = turn_rate_rad_s * dt_s
@@ -42,9 +42,10 @@ class WheelNoise:
 
 
 def fuse(rows: Floats, motion: Motion, wheels: Motion) -> Floats:
-    """The rows, (n, 5) with standard deviations of both speeds, adjusted to add up to `motion`.
+    """Return the rows, (n, 5) with standard deviations of both speeds, adjusted to add up to
+    `motion`.
 
-    How the motion was spread over the time between the views is known from the wheels alone.
+    The wheels alone measure how the motion was spread over the time between the views.
     """
     if not len(rows):
         return np.zeros((0, 5))

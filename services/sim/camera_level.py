@@ -11,6 +11,7 @@ from collections.abc import Collection
 from cogmap.robot import calibration
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import MotorCommand, Odometry, Pose, TruePose, TrueTown
+from cogmap.services.sim.battery import Battery
 from cogmap.services.sim.config import Config, place_of
 from cogmap.services.sim.drivers.line_follower import LineFollower
 from cogmap.services.sim.layout import roadside
@@ -107,12 +108,15 @@ class CameraSenses:
         return self.world.town.message(closed, gone)
 
 
-def driven(config: Config, ticks_per_frame: int) -> Simulation:
+def driven(config: Config, battery: Battery | None, ticks_per_frame: int) -> Simulation:
     """Return a robot with physics and cameras in the town that is configured."""
-    place = place_of(config)
+    place = place_of(config, battery)
     world = World(place, config.egl, whole=isinstance(place, Town))
     senses = CameraSenses(world, config, is_placed=False)
-    return Simulation(config, PhysicalRobot(world, config), senses, place, ticks_per_frame)
+    robot = PhysicalRobot(world, config)
+    return Simulation(
+        config, robot, senses, place=place, battery=battery, ticks_per_frame=ticks_per_frame
+    )
 
 
 def scripted(config: Config, trajectory: Trajectory, ticks_per_frame: int) -> Simulation:

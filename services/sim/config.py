@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import msgspec
 
 from cogmap.errors import ConfigError, UsageError
+from cogmap.runtime.run import Run
 from cogmap.services.sim.battery import Battery
 from cogmap.services.sim.layout import towns
 from cogmap.services.sim.layout.catalogue import CATALOGUE
@@ -27,7 +28,6 @@ ODOMETRY_HZ = 20
 """Odometry messages a second, as wheel encoders of small robots are read."""
 
 Side = Annotated[int, msgspec.Meta(ge=64, le=1024)]
-Instances = Annotated[int, msgspec.Meta(ge=1, le=1000)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -37,13 +37,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         int,
         msgspec.Meta(ge=0, le=2**32, description="Seed of the town and of all noise, 0 to 2^32."),
     ] = 1
-    mode: Annotated[
-        Literal["lockstep", "real_time"],
-        msgspec.Meta(
-            description="lockstep: time advances by a frame for each motor command. "
-            "real_time: it follows the wall's."
-        ),
-    ] = "real_time"
     frame_hz: Annotated[
         Literal[1, 2, 4, 5, 10, 20],
         msgspec.Meta(description="Stereo frames a second, in Hz; the odometry has 20."),
@@ -63,15 +56,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         PerceptErrors,
         msgspec.Meta(description="Errors of percepts without cameras."),
     ] = PerceptErrors()
-    energy: Annotated[
-        bool,
-        msgspec.Meta(
-            description="Whether the robot has a battery that runs down, and the town charging "
-            "places."
-        ),
-    ] = False
     battery: Annotated[
-        Battery, msgspec.Meta(description="The battery and its charging, where energy is on.")
+        Battery, msgspec.Meta(description="The battery and its charging, if run.energy is set.")
     ] = Battery()
     town: Annotated[
         str,
@@ -128,10 +114,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Trajectory | None,
         msgspec.Meta(description="Line that the robot follows in lockstep, instead of a town."),
     ] = None
-    awaits: Annotated[
-        dict[str, Instances],
-        msgspec.Meta(description="Modules, and instances of each, required before time begins."),
-    ] = {}
 
     @property
     def renders(self) -> bool:
@@ -139,37 +121,29 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         sensing = self.sensing if self.trajectory is None else self.trajectory.sensing
         return sensing == "cameras"
 
-    @property
-    def supplied_by(self) -> Battery | None:
-        """The robot's battery, where it has one."""
-        return self.battery if self.energy else None
 
-    @property
-    def charging_places(self) -> int:
-        """How many charging places the town has."""
-        return self.battery.places if self.energy else 0
-
-
-def place_of(config: Config) -> Place:
-    """The town that is configured. Raises UsageError where there is none."""
+def place_of(config: Config, battery: Battery | None = None) -> Place:
+    """Return the town that is configured, with charging places for `battery`. Raises UsageError if
+    there is none.
+    """
     return towns.place(
         config.town,
         config.seed,
         config.town_size_m,
         start=config.start,
-        charging_places=config.charging_places,
+        charging_places=0 if battery is None else battery.places,
     )
 
 
-def check(config: Config) -> None:
+def check(config: Config, run: Run) -> None:
     """Raise ConfigError if a town, a trajectory, or the removal of buildings, is not possible as it
     is set up, and UsageError if images cannot be rendered here.
     """
     towns.check(config.town)
 
-    if config.sensing == "percepts" and config.mode != "lockstep":
+    if config.sensing == "percepts" and not run.lockstep:
         raise ConfigError(
-            '[sim] a town is sensed by percepts in lockstep only: set mode to "lockstep"'
+            "[sim] a town is sensed by percepts in lockstep only: set run.lockstep to true"
         )
 
     if config.removals and config.sensing != "percepts":
@@ -184,14 +158,14 @@ def check(config: Config) -> None:
     if trajectory is None:
         return
 
-    if config.energy:
+    if run.energy:
         raise ConfigError(
-            "[sim] a robot that follows a trajectory needs no energy: set energy to false"
+            "[sim] a robot that follows a trajectory needs no energy: set run.energy to false"
         )
 
-    if config.mode != "lockstep":
+    if not run.lockstep:
         raise ConfigError(
-            '[sim] a robot follows a trajectory in lockstep only: set mode to "lockstep"'
+            "[sim] a robot follows a trajectory in lockstep only: set run.lockstep to true"
         )
 
     known = [kind.name for kind in CATALOGUE]

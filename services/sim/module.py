@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from cogmap.robot import calibration
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
+from cogmap.services.sim.battery import Battery
 from cogmap.services.sim.config import ODOMETRY_HZ, Config, check, place_of
 from cogmap.services.sim.drivers.kinematic import KinematicRobot
 from cogmap.services.sim.drivers.line_follower import LineFollower
@@ -24,13 +26,14 @@ _CAMERA_LEVEL = (*_ALWAYS, topics.ODOMETRY, topics.STEREO)
 _PERCEPT_LEVEL = (*_ALWAYS, topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS)
 
 
-def build(config: Config, instance: str = "sim") -> Module:
+def build(config: Config, instance: str = "sim", run: Run = REAL_TIME) -> Module:
     """Return the module `sim`. Raises ConfigError as `check` does, and UsageError if images are to
     be rendered without pybullet.
     """
-    check(config)
+    check(config, run)
     module = Module("sim", instance)
     trajectory = config.trajectory
+    battery = config.battery if run.energy else None
     ticks_per_frame = ODOMETRY_HZ // config.frame_hz
     emits = _CAMERA_LEVEL if config.renders else _PERCEPT_LEVEL
 
@@ -39,11 +42,11 @@ def build(config: Config, instance: str = "sim") -> Module:
         from cogmap.services.sim import camera_level
 
         if trajectory is None:
-            simulation = camera_level.driven(config, ticks_per_frame)
+            simulation = camera_level.driven(config, battery, ticks_per_frame)
         else:
             simulation = camera_level.scripted(config, trajectory, ticks_per_frame)
     elif trajectory is None:
-        simulation = driven(config, ticks_per_frame)
+        simulation = driven(config, battery, ticks_per_frame)
     else:
         simulation = scripted(config, trajectory)
 
@@ -52,8 +55,8 @@ def build(config: Config, instance: str = "sim") -> Module:
         module.journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
 
     # Time begins when these are ready: at least the simulation itself.
-    required = config.awaits or {"sim": 1}
-    if config.mode == "lockstep":
+    required = run.participants or {"sim": 1}
+    if run.lockstep:
         lockstep = Lockstep(simulation)
         module.on(topics.MOTOR_COMMAND, lockstep.on_command, emits)
         module.on_start(lockstep.on_start, required, emits)
@@ -65,15 +68,17 @@ def build(config: Config, instance: str = "sim") -> Module:
     return module.every(simulation.tick_ns, real_time.on_timer, emits)
 
 
-def driven(config: Config, ticks_per_frame: int) -> Simulation:
+def driven(config: Config, battery: Battery | None, ticks_per_frame: int) -> Simulation:
     """Return a robot that drives itself through the town that is configured, without physics."""
-    place = place_of(config)
+    place = place_of(config, battery)
     surroundings = Surroundings(place)
     robot = KinematicRobot(place.start, surroundings, config.noise, config.seed)
     mount = calibration(config.width_px, config.height_px)
     sensors = TownSensors(place, surroundings, config.percepts, mount, config.seed)
     senses = PerceptSenses(sensors, config.percepts, config.seed)
-    return Simulation(config, robot, senses, place, ticks_per_frame)
+    return Simulation(
+        config, robot, senses, place=place, battery=battery, ticks_per_frame=ticks_per_frame
+    )
 
 
 def scripted(config: Config, trajectory: Trajectory) -> Simulation:

@@ -10,7 +10,7 @@ import msgspec
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock
 from cogmap.schemas.sensing import MotorCommand, Pose, SpeedLimit, TruePose, TrueTown
-from cogmap.services.sim.battery import PowerSupply
+from cogmap.services.sim.battery import Battery, PowerSupply
 from cogmap.services.sim.config import Config
 from cogmap.services.sim.layout.closures import ClosedStreets
 from cogmap.services.sim.layout.place import Place
@@ -78,7 +78,9 @@ class Simulation:
         config: Config,
         driver: Driver,
         senses: Senses,
+        *,
         place: Place | None = None,
+        battery: Battery | None = None,
         ticks_per_frame: int = 1,
     ) -> None:
         self.ticks_per_frame = ticks_per_frame
@@ -94,7 +96,7 @@ class Simulation:
         if place is not None:
             self.closed_streets = ClosedStreets(place.roads, config.closures)
             self._removed = RemovedBuildings(len(place.plots), config.removals)
-            self._power = PowerSupply(config.supplied_by, place.charging_places_m)
+            self._power = PowerSupply(battery, place.charging_places_m)
 
         self._duration_ns = config.duration_s * 1e9
         self._ends_at_goal = config.ends_at_goal

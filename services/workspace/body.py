@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from cogmap.runtime.run import Run
 from cogmap.schemas.nodes import ENERGY, Need, need_id
 from cogmap.schemas.sensing import Energy
-from cogmap.services.workspace.config import Config
 
 MAX_KEPT = 16
 
@@ -12,11 +12,11 @@ MAX_KEPT = 16
 class Body:
     """The newest of what the body sensed, of which each cycle takes that of its view.
 
-    In lockstep a cycle does not begin before it has come, where it is awaited.
+    In lockstep a cycle does not begin before it has come, if the robot has a battery.
     """
 
-    def __init__(self, config: Config) -> None:
-        self._awaited = config.mode == "lockstep" and config.awaits_energy
+    def __init__(self, run: Run) -> None:
+        self._awaited = run.lockstep and run.energy
         self._sensed: dict[int, Energy] = {}
 
     def put(self, energy: Energy) -> None:

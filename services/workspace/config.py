@@ -30,13 +30,6 @@ class GivenGoal(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """The cycle's timing, the resolution of the map, and how activation decays."""
 
-    mode: Annotated[
-        Literal["lockstep", "real_time"],
-        msgspec.Meta(
-            description="lockstep waits for every answer; real_time commits at the deadline what"
-            " has come, and the rest in the next cycle"
-        ),
-    ] = "real_time"
     cell_m: Annotated[
         float,
         msgspec.Meta(
@@ -47,27 +40,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Milliseconds,
         msgspec.Meta(description="In real time, the age of the view at which a cycle ends, ms"),
     ] = 180.0
-    awaits_scan: Annotated[
-        bool,
-        msgspec.Meta(
-            description="In lockstep, whether a cycle waits for the range scan of its view; false"
-            " where nothing publishes scans"
-        ),
-    ] = True
-    awaits_competition: Annotated[
-        bool,
-        msgspec.Meta(
-            description="In lockstep, whether a cycle waits for the competition of the cycle "
-            "before, to learn from what became conscious; false where no global workspace runs"
-        ),
-    ] = True
-    awaits_energy: Annotated[
-        bool,
-        msgspec.Meta(
-            description="In lockstep, whether a cycle waits for the energy sensed with its view;"
-            " false where no body senses any"
-        ),
-    ] = False
     max_scan_age_ms: Annotated[
         Milliseconds,
         msgspec.Meta(
@@ -196,10 +168,3 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             " where the agent decides their order"
         ),
     ] = False
-    offering: Annotated[
-        list[str],
-        msgspec.Meta(
-            description="In lockstep, instances of modules that send an offer each cycle, which"
-            " the next cycle waits for"
-        ),
-    ] = []

@@ -9,6 +9,7 @@ import msgspec
 
 from cogmap.errors import MessageError
 from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
+from cogmap.runtime.run import Run
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer, Proposal
 from cogmap.schemas.cognition import Broadcast, Competition
@@ -35,6 +36,9 @@ from cogmap.services.workspace.offers import Offers
 from cogmap.services.workspace.sensed import Sensed
 
 WORKERS = "codelets"
+COMPETITION = "global_workspace"
+OFFERING = ("memory", "motor")
+"""The modules that make an offer in each cycle of lockstep, perhaps of nothing."""
 MAX_LATE_TASKS = 256
 PHASES = (Phase.CORRECTION, Phase.LOCALIZATION, Phase.OBJECTS, Phase.ATTENTION)
 LANES_BEGIN = Phase.ATTENTION
@@ -50,20 +54,22 @@ class Workspace:
     Each phase gives its codelets' tasks to workers and ends with a commit of their answers.
     """
 
-    def __init__(self, config: Config, codelets: Sequence[ConfiguredCodelet]) -> None:
+    def __init__(self, config: Config, codelets: Sequence[ConfiguredCodelet], run: Run) -> None:
         self._config = config
         self._codelets = codelets
+        self._is_lockstep = run.lockstep
 
         writers = {codelet.name: codelet.codelet.may_write for codelet in codelets}
         self._ledger = Ledger(writers)
-        self._lanes = Lanes(codelets, config)
+        self._lanes = Lanes(codelets, config, run)
         lease_ns = int(config.lease_ms * 1e6)
         self._dispatch = Dispatch(lease_ns, config.attempts, self._lanes.dispatches)
         self._forgetting = Forgetting()
-        self._offers = Offers(config.offering if self._is_lockstep else ())
-        self._consciousness = Consciousness(self._is_lockstep and config.awaits_competition)
+        offering = [name for name in OFFERING if run.has_any(name)]
+        self._offers = Offers(offering if run.lockstep else ())
+        self._consciousness = Consciousness(run.lockstep and run.has_any(COMPETITION))
 
-        self._sensed = Sensed(config)
+        self._sensed = Sensed(config, run)
         self._waiting: Percepts | None = None
         self._is_repeated = False
         self._context: CycleContext | None = None
@@ -192,10 +198,6 @@ class Workspace:
 
         published += self._dispatch.expire(self._now_ns)
         return self._continue_if_complete(published)
-
-    @property
-    def _is_lockstep(self) -> bool:
-        return self._config.mode == "lockstep"
 
     @property
     def _awaits_answers(self) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 
 from cogmap.runtime.codelet import ConfiguredCodelet, CycleContext
+from cogmap.runtime.run import Run
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Proposal
 from cogmap.schemas.graph import Phase
@@ -16,11 +17,11 @@ from cogmap.services.workspace.dispatch import Dispatch
 class Lanes:
     """The lanes of all background codelets."""
 
-    def __init__(self, codelets: Iterable[ConfiguredCodelet], config: Config) -> None:
+    def __init__(self, codelets: Iterable[ConfiguredCodelet], config: Config, run: Run) -> None:
         self._lanes: list[Lane] = []
         for codelet in codelets:
             if codelet.codelet.phase is Phase.BACKGROUND:
-                self._lanes.append(Lane(codelet, config, self.dispatches))
+                self._lanes.append(Lane(codelet, config, run, self.dispatches))
 
     def dispatches(self) -> list[Dispatch]:
         """The dispatch of each lane."""
@@ -73,13 +74,14 @@ class Lane:
         self,
         codelet: ConfiguredCodelet,
         config: Config,
+        run: Run,
         lanes: Callable[[], list[Dispatch]],
     ) -> None:
         self.codelet = codelet
         lease_ns = int(config.background_lease_ms * 1e6)
         self.dispatch = Dispatch(lease_ns, config.attempts, lanes)
 
-        self._is_lockstep = config.mode == "lockstep"
+        self._is_lockstep = run.lockstep
         self._cycles = config.background_cycles
         self._due_cycle = 0
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from cogmap.errors import ConfigError
 from cogmap.runtime.codelet import ConfiguredCodelet
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
 from cogmap.services.workspace.config import Config
 from cogmap.services.workspace.cycle import Workspace
@@ -14,12 +15,17 @@ from cogmap.services.workspace.cycle import Workspace
 __all__ = ["Config", "Workspace", "build"]
 
 
-def build(config: Config, instance: str, codelets: Sequence[ConfiguredCodelet]) -> Module:
+def build(
+    config: Config,
+    instance: str,
+    codelets: Sequence[ConfiguredCodelet],
+    run: Run = REAL_TIME,
+) -> Module:
     """The module `workspace`, the single writer of the graph, which calls `codelets`. Raises
     ConfigError where two goals have one name.
     """
     _check(config)
-    workspace = Workspace(config, codelets)
+    workspace = Workspace(config, codelets, run)
 
     published = (
         topics.DELTA,

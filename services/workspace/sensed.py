@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cogmap.runtime.codelet import CycleContext
+from cogmap.runtime.run import Run
 from cogmap.schemas.array import Array
 from cogmap.schemas.nodes import Need
 from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
@@ -16,10 +17,10 @@ class Sensed:
     when self-motion has moved the self node.
     """
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, run: Run) -> None:
         self._motions = SelfMotions()
-        self._scans = Scans(config)
-        self._body = Body(config)
+        self._scans = Scans(config, run)
+        self._body = Body(run)
 
     def put_motion(self, motion: SelfMotion, moved_ns: int) -> None:
         """Keep self-motion. Raises MessageError where its rows are of another shape or dtype."""

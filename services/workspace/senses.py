@@ -5,12 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.runtime.run import Run
 from cogmap.schemas.array import Array
 from cogmap.schemas.sensing import RangeScan, SelfMotion
 from cogmap.services.workspace.config import Config
 
 SELF_MOTION_COLUMNS = 5
 MAX_SCANS = 16
+SCANNERS = ("sim", "sensory")
+"""The modules that publish range scans: of percept-level sensing, and of cameras."""
 
 
 class SelfMotions:
@@ -57,16 +60,16 @@ class SelfMotions:
 class Scans:
     """The newest range scans, of which each cycle takes the one of its view.
 
-    In lockstep a cycle does not begin before it has come, where scans are awaited; where they are
-    not, none is used. In real time it begins with the newest that is at most `max_scan_age_ms`
+    In lockstep a cycle does not begin before it has come; if no module takes part that publishes
+    scans, none is used. In real time it begins with the newest that is at most `max_scan_age_ms`
     older than its view, or with none.
     """
 
-    def __init__(self, config: Config) -> None:
-        in_lockstep = config.mode == "lockstep"
-        self._awaited = in_lockstep and config.awaits_scan
-        self._ignored = in_lockstep and not config.awaits_scan
-        self._max_age_ns = 0 if in_lockstep else int(config.max_scan_age_ms * 1e6)
+    def __init__(self, config: Config, run: Run) -> None:
+        has_scanner = run.has_any(*SCANNERS)
+        self._awaited = run.lockstep and has_scanner
+        self._ignored = run.lockstep and not has_scanner
+        self._max_age_ns = 0 if run.lockstep else int(config.max_scan_age_ms * 1e6)
         self._scans: dict[int, RangeScan] = {}
         self._missed_ns = -1
 

@@ -21,18 +21,14 @@ from tests.support.includes import ROOT
 
 TIMEOUT_S = 90.0
 SECTIONS: dict[str, dict[str, Any]] = {
+    "run": {"lockstep": True, "participants": {"sim": 1}},
     "sim": {
-        "mode": "lockstep",
         "frame_hz": 2,
         "trajectory": {
             "line_m": [[0.0, 0.0], [20.0, 0.0]],
             "landmarks": [{"name": "bakery", "x_m": 20.0, "y_m": 8.0}],
         },
-        "awaits": {},
     },
-    "workspace": {"mode": "lockstep"},
-    "procedural": {"mode": "lockstep"},
-    "motor": {"mode": "lockstep"},
 }
 CONFIG = """\
 [sim]
@@ -104,6 +100,21 @@ def test_the_codelet_is_configured_as_ours_are() -> None:
 def test_without_the_package_there_is_no_such_section() -> None:
     with pytest.raises(ConfigError, match=r"unknown section \[trip\]"):
         registry.build("codelets", {"trip": {"min_speed_m_s": 1.0}})
+
+
+def test_the_tests_of_the_package_pass(site: Path) -> None:
+    command = [sys.executable, "-m", "pytest", "-q", "-c", "/dev/null", "-p", "no:cacheprovider"]
+    run = subprocess.run(
+        [*command, "--rootdir", ".", "test_trip_codelet.py"],
+        check=False,
+        cwd=site.parent / "source",
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(site), str(ROOT)])},
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT_S,
+    )
+
+    assert run.returncode == 0, run.stdout
 
 
 def test_the_codelet_runs_in_processes(site: Path, tmp_path: Path) -> None:

@@ -74,12 +74,7 @@ def other(tmp_path: Path) -> Iterator[System]:
 
 def drive(system: System, before: Callable[[int], None] = lambda view: None) -> Witness:
     """The witness of all views."""
-    settings = (
-        "workspace.mode=lockstep",
-        "workspace.awaits_scan=false",
-        "workspace.awaits_competition=false",
-    )
-    system.modules("workspace", "codelets-1", "codelets-2", settings=settings)
+    system.modules("workspace", "codelets-1", "codelets-2", settings=("run.lockstep=true",))
     witness = Witness(system.bus())
     turns = Turns(before)
 

@@ -31,7 +31,7 @@ from cogmap.services import registry
 MS = 1_000_000
 PERIOD_NS = 200 * MS
 DEADLINE_NS = 180 * MS
-SECTIONS = {"workspace": {"mode": "real_time", "deadline_ms": 180.0, "lease_ms": 120.0}}
+SECTIONS = {"workspace": {"deadline_ms": 180.0, "lease_ms": 120.0}}
 
 
 class Session:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import random
 from collections import defaultdict
-from typing import Any
 
 import msgspec
 import pytest
@@ -19,19 +18,14 @@ from cogmap.services.sim.odometry import FUSED
 from tests.support.reference import COMPARED, Published
 
 COMMANDS = 20
-LOCKSTEP: dict[str, Any] = {"mode": "lockstep"}
 MIND = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 SECTIONS: Sections = {
+    "run": {"lockstep": True, "participants": dict.fromkeys(("sim", *MIND), 1)},
     "sim": {
-        "mode": "lockstep",
         "town": "blocks",
         "sensing": "percepts",
         "noise": msgspec.to_builtins(FUSED),
-        "awaits": dict.fromkeys(MIND, 1),
     },
-    "workspace": LOCKSTEP,
-    "procedural": LOCKSTEP,
-    "motor": LOCKSTEP,
     "planning": {"explore": True},
 }
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.polylines import distances_along
 from cogmap.geometry.se2 import wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
@@ -91,8 +92,7 @@ def _is_road(positions_m: Floats, map_id: str, graph: Graph) -> Booleans:
 
 def _is_straight(lane: Lane) -> Booleans:
     """(n,): where a lane is straight."""
-    steps_m = np.hypot(*np.diff(lane.position_m, axis=0).T)
-    along_m = np.concatenate([np.zeros(min(len(lane.position_m), 1)), steps_m.cumsum()])
+    along_m = distances_along(lane.position_m)
     is_straight = np.ones(len(along_m), bool)
     for away_m in STRAIGHT_M:
         first = np.searchsorted(along_m, along_m - away_m)

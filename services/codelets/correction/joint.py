@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.pose_graph import PoseGraph
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import FULL_TURN_RAD
 from cogmap.services.codelets.config import Config
-from cogmap.services.codelets.correction.least_squares import optimize
-from cogmap.services.codelets.correction.pose_graph import PoseGraph
 from cogmap.services.codelets.mapping.observations import Sightings
 
 ROUNDS = 5

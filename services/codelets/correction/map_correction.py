@@ -13,6 +13,19 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from cogmap.estimation.gnc import inliers
+from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.pairwise_consistency import MIN_AGREEING, Views, consistent
+from cogmap.estimation.pose_graph import (
+    NO_CONSTRAINTS,
+    Constraints,
+    PoseGraph,
+    diagonal_information,
+    mahalanobis2,
+    matvec,
+    residuals,
+)
+from cogmap.estimation.reverse_replay import close_loops
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import (
     cumulative,
@@ -36,20 +49,7 @@ from cogmap.schemas.nodes import (
     PathSegment,
 )
 from cogmap.services.codelets.config import SECTION, Config
-from cogmap.services.codelets.correction.gnc import inliers
 from cogmap.services.codelets.correction.joint import optimize_jointly
-from cogmap.services.codelets.correction.least_squares import optimize
-from cogmap.services.codelets.correction.pairwise_consistency import MIN_AGREEING, Views, consistent
-from cogmap.services.codelets.correction.pose_graph import (
-    NO_CONSTRAINTS,
-    Constraints,
-    PoseGraph,
-    diagonal_information,
-    mahalanobis2,
-    matvec,
-    residuals,
-)
-from cogmap.services.codelets.correction.reverse_replay import close_loops
 from cogmap.services.codelets.correction.synapses import replay_of
 from cogmap.services.codelets.correction.waiting import may_wait
 from cogmap.services.codelets.mapping.observations import Sightings

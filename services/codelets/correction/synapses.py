@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cogmap.estimation.pose_graph import Constraints
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.schemas.array import Array
 from cogmap.schemas.cognition import Replay
-from cogmap.services.codelets.correction.pose_graph import Constraints
 from cogmap.services.codelets.mapping.path import POSE, STAMP
 
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtri
 
+from cogmap.estimation.pairwise_consistency import MIN_AGREEING
+from cogmap.estimation.pose_graph import mahalanobis2, residuals
 from cogmap.geometry.arrays import Floats
 from cogmap.schemas.nodes import LoopClosure
 from cogmap.services.codelets.config import Config
-from cogmap.services.codelets.correction.pairwise_consistency import MIN_AGREEING
-from cogmap.services.codelets.correction.pose_graph import mahalanobis2, residuals
 from cogmap.services.codelets.mapping.path import POSE
 from cogmap.services.codelets.mapping.views import constraints_of, views_of
 

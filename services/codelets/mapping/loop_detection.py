@@ -11,6 +11,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.estimation.pairwise_consistency import MIN_AGREEING
+from cogmap.estimation.pose_graph import matvec
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import rotation_matrices
 from cogmap.graph.graph import Graph
@@ -30,8 +32,6 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.schemas.sensing import Percept, PlaceMatch
 from cogmap.services.codelets.config import SECTION, Config
-from cogmap.services.codelets.correction.pairwise_consistency import MIN_AGREEING
-from cogmap.services.codelets.correction.pose_graph import matvec
 from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import ODOMETRY, STAMP, path_grows
 from cogmap.services.codelets.nodes import nodes_of

@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cogmap.estimation.pose_graph import Constraints, matvec
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import rotation_matrices
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.nodes import ObservationColumn, Observations, observations_id
 from cogmap.schemas.sensing import Percept
-from cogmap.services.codelets.correction.pose_graph import Constraints, matvec
 
 COLUMNS = len(ObservationColumn)
 STAMP = ObservationColumn.STAMP_S

@@ -12,6 +12,7 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.estimation.pose_graph import Constraints, diagonal_information
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import mean_pose, relative
 from cogmap.graph.graph import Graph
@@ -34,7 +35,6 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.config import SECTION, Config
-from cogmap.services.codelets.correction.pose_graph import Constraints, diagonal_information
 from cogmap.services.codelets.mapping.observations import Viewpoint, extended, is_observed_from
 from cogmap.services.codelets.nodes import nodes_of
 

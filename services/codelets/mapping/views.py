@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from cogmap.estimation.pairwise_consistency import Views
+from cogmap.estimation.pose_graph import Constraints, matvec
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import relative, rotation_matrices
 from cogmap.schemas.nodes import LoopClosure
-from cogmap.services.codelets.correction.pairwise_consistency import Views
-from cogmap.services.codelets.correction.pose_graph import Constraints, matvec
 from cogmap.services.codelets.mapping.path import STAMP
 
 MIN_SD_M = 1e-3

@@ -24,7 +24,7 @@ from cogmap.services.codelets.planning.config import Config
 from cogmap.services.codelets.planning.held import held_routes
 from cogmap.services.codelets.planning.network import SQUARE, Here, PlaceNetwork
 from cogmap.services.codelets.planning.rough import Routes, rough_network, routes_between
-from cogmap.services.codelets.resolution.coarsening import FACTOR
+from cogmap.services.codelets.sub_maps.coarsening import FACTOR
 
 MARGIN = 2
 """In cells of a coarse map, unknown places planned over around it."""

@@ -14,8 +14,8 @@ from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import Map
 from cogmap.services.codelets.planning.config import Config
 from cogmap.services.codelets.planning.rough import rough_network, routes_between
-from cogmap.services.codelets.resolution.sub_map_grid import area_of, with_places
-from cogmap.services.codelets.structure.members import pose_of
+from cogmap.services.codelets.sub_maps.members import pose_of
+from cogmap.services.codelets.sub_maps.sub_map_grid import area_of, with_places
 
 
 class HeldRoutes(NamedTuple):

@@ -1,5 +1,5 @@
-"""Perceptual associative memory as a graph: what was conscious together gets linked, and what is
-conscious primes what it is linked to (LIDA's PAM; paper §5.1).
+"""Perceptual associative memory as a graph: nodes that were conscious together get linked, and a
+conscious node primes those that it is linked to (LIDA's PAM; paper §5.1).
 
 A weight estimates how likely its target is conscious soon before or after its source; that of a
 link from a relation, how likely its target stands in that relation. Pure.
@@ -22,6 +22,18 @@ from cogmap.services.epam.config import Priming
 MAX_NODES = 512
 FAINT = 0.01
 """Weaker links are not published, and prime nothing."""
+LEARNING_RATE = 0.1
+"""How far one broadcast moves base levels and weights of links towards what was conscious. LIDA: no
+published rate that we know.
+"""
+FEELING_RATE = 0.5
+"""How far one broadcast moves the link from a PAM node to what is felt with it towards 1: a danger
+is known after one encounter. LIDA gives no rate.
+"""
+FEELING_UNLEARNING_RATE = 0.02
+"""How far one broadcast of a PAM node moves its links to feelings that are not felt with it towards
+0: fear is extinguished more slowly than it is learned. Novelty wears off as fast as it comes.
+"""
 FEELINGS = {feeling_id(feeling): feeling for feeling in Feeling if feeling}
 """The PAM nodes that are feelings, by name."""
 
@@ -31,10 +43,10 @@ class AssociativeGraph:
 
     The activation of a node is 1 at a broadcast of it and halves every `half_life_s`.
 
-    Feelings are nodes too. To one lead links from what was conscious in the same broadcast, none
-    lead from it: what is felt tells nothing of what is there. Relations, such as to stand left of
-    the bakery, are nodes of which links lead to what stood in them, and none back: what is seen
-    beside something else activates them, no broadcast.
+    Feelings are nodes too: links lead to them from what was conscious in the same broadcast, but
+    none from them, since a feeling is no evidence of what is there. Relations, such as to stand
+    left of the bakery, are nodes from which links lead to what stood in them, and none back: a
+    relation is activated by what is seen beside something else, not by a broadcast.
     """
 
     def __init__(self, config: Priming) -> None:
@@ -58,26 +70,40 @@ class AssociativeGraph:
 
         Base levels rise. Each weight moves towards the activation of its target, by a rate times
         that of its source: a node that has long been silent keeps its links. Those to feelings
-        change by rates of their own, those from a relation where it is conscious.
+        change by rates of their own, those from a relation when it is conscious.
         """
-        self._decay(stamp_ns)
+        self._activations = self._activations * self._remaining_share(stamp_ns)
+        self._updated_ns = max(self._updated_ns, stamp_ns)
         stood = related or {}
         for name in (*names, *stood):
             self._add(name)
         conscious = self._rows(names)
         self._activations[conscious] = 1.0
 
-        rate = self._config.learning_rate
         raised = conscious + self._rows(stood)
         levels = self._base_levels.copy()
-        levels[raised] += rate * (1 - levels[raised])
+        levels[raised] += LEARNING_RATE * (1 - levels[raised])
         self._base_levels = levels
-        self._associate(self._is_associated())
+
+        is_relative = np.array([is_relation(name) for name in self._index], np.bool_)
+        is_associated: Booleans = ~self._is_feeling() & ~is_relative
+        between = np.ix_(is_associated, is_associated)
+        activations = self._activations[is_associated]
+        weights = self._weights[between]
+        missing = activations[None, :] - weights
+        changed = weights + LEARNING_RATE * activations[:, None] * missing
+        np.fill_diagonal(changed, 0.0)
+        self._weights[between] = changed
+
         self._attach(conscious)
-        self._relate(stood)
+        for relation, name in stood.items():
+            if relation in self._index and name in self._index:
+                weights = self._weights[self._index[relation]]
+                weights[is_associated] *= 1 - LEARNING_RATE
+                weights[self._index[name]] += LEARNING_RATE
 
     def related(self) -> dict[str, dict[str, float]]:
-        """What stands in each relation, with the weight of the link to it."""
+        """Return what stands in each relation, with the weight of the link to it."""
         names = list(self._index)
         standing = {}
         for name, row in self._index.items():
@@ -89,20 +115,20 @@ class AssociativeGraph:
         return standing
 
     def primed(self, stamp_ns: int) -> Mapping[str, float]:
-        """The nodes that activation has spread to by `stamp_ns`, each with what came over its best
-        link.
+        """Return the nodes that activation has spread to by `stamp_ns`, each with what came over
+        its best link.
         """
         if not self._index:
             return {}
 
-        sources = self._activations * self._left(stamp_ns)
+        sources = self._activations * self._remaining_share(stamp_ns)
         spread = (sources[:, None] * self._weights).max(axis=0)
         names = list(self._index)
         return {names[row]: float(spread[row]) for row in np.flatnonzero(spread >= FAINT)}
 
     def feelings(self, name: str, activation: float) -> dict[Feeling, float]:
-        """The feelings that a node activates over its links above their threshold, where it has
-        that activation itself; none where it is not known.
+        """Return the feelings that a node of this `activation` activates over its links above their
+        threshold; none if it is not known.
         """
         threshold = self._config.feeling_threshold
         row = self._index.get(name)
@@ -119,11 +145,11 @@ class AssociativeGraph:
         return felt
 
     def __contains__(self, name: str) -> bool:
-        """Whether there is a PAM node of that name."""
+        """Return true if there is a PAM node of that name."""
         return name in self._index
 
     def published(self) -> Associations:
-        """The graph as a message, without what is FAINT."""
+        """Return the graph as a message, without FAINT links."""
         sources, targets = np.nonzero(self._weights >= FAINT)
         return Associations(
             updated_ns=self._updated_ns,
@@ -136,8 +162,8 @@ class AssociativeGraph:
         )
 
     def restore(self, kept: Associations) -> None:
-        """Replace the graph by one that was published. Raises MessageError where its parts do not
-        fit together.
+        """Replace the graph by one that was published. Raises MessageError if its parts do not fit
+        together.
         """
         count = len(kept.names)
         sources = np.asarray(kept.sources.numpy(), np.int64)
@@ -159,17 +185,6 @@ class AssociativeGraph:
         self._weights = np.zeros((count, count))
         self._weights[sources, targets] = values
 
-    def _associate(self, is_linked: Booleans) -> None:
-        """Change the weights between the nodes that are linked with one another, (n,)."""
-        between = np.ix_(is_linked, is_linked)
-        activations = self._activations[is_linked]
-        weights = self._weights[between]
-
-        missing = activations[None, :] - weights
-        changed = weights + self._config.learning_rate * activations[:, None] * missing
-        np.fill_diagonal(changed, 0.0)
-        self._weights[between] = changed
-
     def _attach(self, conscious: list[int]) -> None:
         """Change the weights of the links to feelings from what is conscious, by row: towards 1 to
         what is felt now, towards 0 to the others.
@@ -178,51 +193,23 @@ class AssociativeGraph:
         rows = [row for row in conscious if row not in columns]
         for column, name in columns.items():
             is_felt = column in conscious
+            wears_off = FEELINGS[name] is Feeling.NOVELTY
+            rate = FEELING_RATE if is_felt or wears_off else FEELING_UNLEARNING_RATE
             weights = self._weights[rows, column]
-            missing = float(is_felt) - weights
-            rate = self._attachment_rate(FEELINGS[name], is_felt)
-            self._weights[rows, column] = weights + rate * missing
+            self._weights[rows, column] = weights + rate * (float(is_felt) - weights)
 
-    def _relate(self, stood: Mapping[str, str]) -> None:
-        """Change the weights of the links from relations: towards 1 to the name that stands in one
-        now, towards 0 to the others.
-        """
-        is_target = self._is_associated()
-        for relation, name in stood.items():
-            if relation not in self._index or name not in self._index:
-                continue
-            weights = self._weights[self._index[relation]]
-            weights[is_target] *= 1 - self._config.learning_rate
-            weights[self._index[name]] += self._config.learning_rate
-
-    def _attachment_rate(self, feeling: Feeling, is_felt: bool) -> float:
-        """Novelty wears off as fast as it comes."""
-        if is_felt or feeling is Feeling.NOVELTY:
-            return self._config.feeling_rate
-        return self._config.feeling_unlearning_rate
-
-    def _left(self, stamp_ns: int) -> float:
-        """The share of activation that is left at `stamp_ns`."""
+    def _remaining_share(self, stamp_ns: int) -> float:
+        """The share of activation that remains at `stamp_ns`."""
         passed_s = max(0, stamp_ns - self._updated_ns) / 1e9
         return float(0.5 ** (passed_s / self._config.half_life_s))
-
-    def _decay(self, stamp_ns: int) -> None:
-        self._activations = self._activations * self._left(stamp_ns)
-        self._updated_ns = max(self._updated_ns, stamp_ns)
 
     def _rows(self, names: Iterable[str]) -> list[int]:
         """The rows of those names that have one."""
         return [self._index[name] for name in names if name in self._index]
 
     def _is_feeling(self) -> Booleans:
-        """(n,): which nodes are feelings."""
+        """(n,), true for nodes that are feelings."""
         return np.array([name in FEELINGS for name in self._index], np.bool_)
-
-    def _is_associated(self) -> Booleans:
-        """(n,): which nodes are linked with one another, being no feelings and no relations."""
-        is_relative = np.array([is_relation(name) for name in self._index], np.bool_)
-        associated: Booleans = ~self._is_feeling() & ~is_relative
-        return associated
 
     def _add(self, name: str) -> None:
         """Add a node, in a full graph in the place of the one that was conscious least and is no

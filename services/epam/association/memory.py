@@ -1,4 +1,4 @@
-"""What perception learns from broadcasts, and what of it primes the next view. Pure."""
+"""Learns from broadcasts, and primes the next view by what was learned. Pure."""
 
 from __future__ import annotations
 
@@ -17,16 +17,22 @@ from cogmap.services.epam.config import Priming
 
 BEHIND = 2
 """A view is primed by what was conscious up to so many views before it."""
+BROADCASTS_PER_PUBLICATION = 16
+"""The graph is published, and so kept, after so many broadcasts: a crash forgets at most those."""
 
 
 class Primer:
     """The associative graph, and the broadcasts that it has not learned from yet.
 
     A view is primed by broadcasts up to the view BEHIND it. Those are there when it comes, as the
-    robot has obeyed a command since that waited for them: in lockstep `is_ready` makes sure.
+    robot has obeyed a command since that waited for them: in lockstep `is_ready` makes sure. The
+    graph is published after every `broadcasts_per_publication`.
     """
 
-    def __init__(self, config: Priming) -> None:
+    def __init__(
+        self, config: Priming, broadcasts_per_publication: int = BROADCASTS_PER_PUBLICATION
+    ) -> None:
+        self._broadcasts_per_publication = broadcasts_per_publication
         self._config = config
         self._graph = AssociativeGraph(config)
         self._related: dict[str, dict[str, float]] = {}
@@ -36,7 +42,7 @@ class Primer:
         self._broadcasts = 0
 
     def on_competition(self, stamp_ns: int) -> None:
-        """The competition for a view has ended."""
+        """Note that the competition for the view of this stamp has ended."""
         self._competition_ns = max(self._competition_ns, stamp_ns)
 
     def on_broadcast(self, broadcast: Broadcast) -> None:
@@ -46,11 +52,11 @@ class Primer:
 
     @property
     def is_ready(self) -> bool:
-        """Whether all is known that the next view is primed by."""
+        """True once all is known that the next view is primed by."""
         return len(self._views_ns) < BEHIND or self._competition_ns >= self._views_ns[0]
 
     def begin(self, view_ns: int) -> Associations | None:
-        """Learn from the broadcasts that a view is primed by; the graph, from time to time."""
+        """Learn from the broadcasts that prime a view; return the graph from time to time."""
         until_ns = self._views_ns[0] if len(self._views_ns) == BEHIND else -1
         self._views_ns.append(view_ns)
 
@@ -61,18 +67,18 @@ class Primer:
             stood = related(broadcast.coalition.relations.values())
             self._graph.learn(nodes_of(broadcast), broadcast.stamp_ns, stood)
             self._broadcasts += 1
-            is_due |= self._broadcasts % self._config.kept_broadcasts == 0
+            is_due |= self._broadcasts % self._broadcasts_per_publication == 0
 
         if due:
             self._related = self._graph.related()
         return self._graph.published() if is_due else None
 
     def prior(self, view_ns: int) -> Prior:
-        """What is expected of a view."""
+        """Return what is expected of a view."""
         return Prior(self._graph.primed(view_ns), self._config.share, self._related)
 
     def felt(self, percept: Percept) -> Percept:
-        """`percept` with the feelings that its PAM node activates; where the object was never
+        """Return `percept` with the feelings that its PAM node activates; if the object was never
         conscious, those of its category.
         """
         name = object_id(look_of(percept.label))
@@ -83,18 +89,18 @@ class Primer:
         return msgspec.structs.replace(percept, feelings=feelings)
 
     def published(self) -> Associations:
-        """The graph as it is now."""
+        """Return the graph as it is now."""
         return self._graph.published()
 
     def restore(self, kept: Associations) -> None:
-        """Continue with a graph that was published. Raises MessageError where it is not whole."""
+        """Continue with a graph that was published. Raises MessageError if it is not whole."""
         self._graph.restore(kept)
         self._related = self._graph.related()
 
 
 def nodes_of(broadcast: Broadcast) -> list[str]:
-    """The PAM nodes that are conscious in a broadcast: objects, by their look, that are not brought
-    as missing, the categories of those, the sub-maps that these are in, and what is felt.
+    """Return the PAM nodes that are conscious in a broadcast: objects, by their look, unless they
+    are in it as missing, the categories of those, the sub-maps that these are in, and what is felt.
     """
     coalition = broadcast.coalition
     is_surprise = coalition.feeling is Feeling.SURPRISE

@@ -1,4 +1,4 @@
-"""What is expected of a view by what was conscious, and by what else is seen in it. Pure."""
+"""The prior of names in a view, by what was conscious and by what else is seen in it. Pure."""
 
 from __future__ import annotations
 
@@ -13,12 +13,11 @@ from cogmap.schemas.nodes import object_id
 
 @dataclass(frozen=True)
 class Prior:
-    """All labels alike, and beside them those that are primed.
+    """The sum of a uniform prior over all labels, of mass 1, and of one over those that are primed.
 
-    `primed` has the activation that has spread to PAM nodes. Where it is 1 in all, or more, those
-    have a mass of `share`, beside 1 of all labels together. Where the town is familiar, an unknown
-    building is so much less likely. `related` has the PAM nodes to which links lead from each
-    relation, with their weights.
+    `primed` has the activation that has spread to PAM nodes. If it sums to 1 or more, those have a
+    mass of `share`, else of that part of it. So an unknown building is less likely in a familiar
+    town. `related` has the PAM nodes to which links lead from each relation, with their weights.
     """
 
     primed: Mapping[str, float] = field(default_factory=dict)
@@ -26,8 +25,8 @@ class Prior:
     related: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def where(self, relations: Mapping[str, float]) -> Prior:
-        """The prior of what stands in `relations`, each with its activation: over the links from
-        them it is primed too.
+        """Return the prior of what stands in `relations`, each with its activation: it is also
+        primed over the links from them.
         """
         primed = dict(self.primed)
         for relation, activation in relations.items():
@@ -37,7 +36,7 @@ class Prior:
         return replace(self, primed=primed)
 
     def log_ratio(self, labels: Iterable[str]) -> Floats:
-        """How much likelier each label is than if none were primed, as a logarithm, (n,)."""
+        """Return how much likelier each label is than if none were primed, as a logarithm, (n,)."""
         spread = np.array([self.primed.get(object_id(label), 0.0) for label in labels])
         expected = spread / max(1.0, float(spread.sum()))
         return np.log1p(self.share * len(spread) * expected)

@@ -1,4 +1,4 @@
-"""Relations between objects: what stands next to another, on the left or right as the agent sees
+"""Relations between objects: one stands next to another, on the left or right as the agent sees
 them. Pure.
 """
 
@@ -13,8 +13,8 @@ from cogmap.schemas.nodes import Side, object_id, relation_id
 
 
 def related(relations: Iterable[Relation]) -> dict[str, str]:
-    """The relations between objects that stand to the agent so, each with the PAM node of the
-    object that stands in it.
+    """Return the relations between objects in these `relations` to the agent, each with the PAM
+    node of the object that stands in it.
     """
     from_left = sorted(relations, key=lambda each: (-each.bearing_rad, each.range_m))
 
@@ -26,19 +26,19 @@ def related(relations: Iterable[Relation]) -> dict[str, str]:
     return standing
 
 
-class Seen(NamedTuple):
-    """The column of a view at which something named is seen, and the evidence that it is that."""
+class NamedObject(NamedTuple):
+    """The column of a view at which a named object is seen, and the evidence for that name."""
 
     column: float
     evidence: float
 
 
-def beside(column: float, named: Mapping[str, Seen]) -> dict[str, float]:
-    """The relations in which something stands that is seen at `column`, each with its activation:
-    next to the nearest on either side of what was `named` in the view.
+def beside(column: float, named: Mapping[str, NamedObject]) -> dict[str, float]:
+    """Return the relations in which an object at `column` stands to the nearest one on either side
+    of those that are `named` in the view, by look, each with its activation.
     """
-    on_left = [(seen.column, look) for look, seen in named.items() if seen.column <= column]
-    on_right = [(seen.column, look) for look, seen in named.items() if seen.column > column]
+    on_left = [(each.column, look) for look, each in named.items() if each.column <= column]
+    on_right = [(each.column, look) for look, each in named.items() if each.column > column]
 
     standing = {}
     if on_left:

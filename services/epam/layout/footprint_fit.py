@@ -1,4 +1,4 @@
-"""Where an object's centre is: its learned footprint fitted to the walls that are seen.
+"""Fits an object's learned footprint to the walls that are seen, which gives its centre.
 
 A rectangle of known sides has three unknowns: its centre (x right, z forward of the camera) and its
 orientation. It is fitted to the disparity of each column and to the columns where the object truly
@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import Calibration
@@ -28,9 +27,12 @@ ITERATIONS = 8
 FIRST_DAMPING = 0.1 * 0.2
 # Errors of neighbouring columns are correlated: this many columns count as one.
 CORRELATED_COLUMNS = 5
+# Of a column's median, of what all columns of an object share, and of what is shared in addition
+# when it has but one column.
 DISPARITY_SD_PX = 0.14
 DISPARITY_BIAS_SD_PX = 0.03
 NARROW_BIAS_PX = 0.4
+# Residuals beyond it, in standard deviations, count linearly.
 HUBER = 1.5
 MIN_BEARING_SD_RAD = 0.003
 MIN_RANGE_SD_M = 0.1
@@ -41,9 +43,9 @@ MAX_STEP = (5, 5, 0.4)
 
 @dataclass(frozen=True)
 class Silhouette:
-    """What is seen of an object: columns (n,) and their disparities in pixels (n,), the first and
-    the last column, and whether the object truly begins and ends there or something else hides the
-    rest; `sides_m` are those of its footprint.
+    """The visible part of an object: columns (n,) and their disparities in pixels (n,), the first
+    and the last column, and whether the object truly begins and ends there or something else hides
+    the rest; `sides_m` are those of its footprint.
     """
 
     columns: Floats
@@ -85,27 +87,38 @@ def locate(silhouettes: list[Silhouette], camera: Calibration) -> list[ObjectPos
     if not silhouettes:
         return []
 
-    objects = _stack(silhouettes, camera)
+    objects = _stacked(silhouettes, camera)
     rows = np.repeat(np.arange(len(silhouettes)), ORIENTATIONS)
     problem = objects.take(rows)
-    starts = _starts(objects)
-    solution = _solve(starts, problem)
+    solution = _solve(_starts(objects), problem)
+
+    # The root mean square residual of the disparities, in standard deviations of one column.
+    error_px = solution.residuals[:, :COLUMNS] * problem.sd_px[:, None]
+    rms_px = np.sqrt((error_px**2).mean(1))
+    misfits = np.asarray(rms_px / DISPARITY_SD_PX)
 
     shape = (len(silhouettes), ORIENTATIONS)
     parameters = solution.parameters.reshape(*shape, 3)
     costs = (solution.residuals**2).sum(1).reshape(shape)
     covariances = _covariances(solution, problem).reshape(*shape, 3, 3)
-    misfits_of_starts = _misfits(solution, problem).reshape(shape)
-    misfits = misfits_of_starts.min(1)
+    least_misfits = misfits.reshape(shape).min(1)
 
     return [
-        _pose(parameters[row], costs[row], covariances[row], misfits[row], camera)
+        _mean_pose(parameters[row], costs[row], covariances[row], least_misfits[row], camera)
         for row in range(len(silhouettes))
     ]
 
 
-def _stack(silhouettes: list[Silhouette], camera: Calibration) -> FootprintProblem:
-    columns, disparity_px = _sampled(silhouettes)
+def _stacked(silhouettes: list[Silhouette], camera: Calibration) -> FootprintProblem:
+    """The problem of all silhouettes, at COLUMNS evenly spaced columns of each."""
+    columns = np.empty((len(silhouettes), COLUMNS))
+    disparity_px = np.empty((len(silhouettes), COLUMNS))
+    for row, silhouette in enumerate(silhouettes):
+        spaced = np.linspace(0, len(silhouette.columns) - 1, COLUMNS)
+        picked = spaced.round().astype(np.intp)
+        columns[row] = silhouette.columns[picked]
+        disparity_px[row] = silhouette.disparity_px[picked]
+
     width_px = np.array([len(each.columns) for each in silhouettes], float)
     edges_px = [(each.left, each.right) for each in silhouettes]
     true_ends = [(each.left_true, each.right_true) for each in silhouettes]
@@ -124,65 +137,25 @@ def _stack(silhouettes: list[Silhouette], camera: Calibration) -> FootprintProbl
     )
 
 
-def _sampled(silhouettes: list[Silhouette]) -> tuple[Floats, Floats]:
-    """COLUMNS columns of each silhouette and their disparities in pixels, (s, COLUMNS) each."""
-    columns = np.empty((len(silhouettes), COLUMNS))
-    disparity_px = np.empty((len(silhouettes), COLUMNS))
-    for row, silhouette in enumerate(silhouettes):
-        picked = _evenly_spaced(len(silhouette.columns))
-        columns[row] = silhouette.columns[picked]
-        disparity_px[row] = silhouette.disparity_px[picked]
-
-    return columns, disparity_px
-
-
-def _evenly_spaced(count: int) -> npt.NDArray[np.intp]:
-    """COLUMNS indices (COLUMNS,) of `count` columns, the first and the last among them."""
-    last = count - 1
-    spaced = np.linspace(0, last, COLUMNS)
-    return spaced.round().astype(np.intp)
-
-
 def _starts(objects: FootprintProblem) -> Floats:
-    """ORIENTATIONS starts an object (s * ORIENTATIONS, 3), behind the middle of what is seen."""
-    slope = _middle_slope(objects)
-    centre = _usual_centre(objects, slope)
-
-    orientations = np.linspace(0, np.pi, ORIENTATIONS, endpoint=False)
-    facing = np.arctan(slope)
-    starts = np.repeat(centre, ORIENTATIONS, axis=0)
-    turns = starts[:, 2]
-    turns[:] = np.tile(orientations, len(centre))
-    turns -= np.repeat(facing, ORIENTATIONS)
-
-    return starts
-
-
-def _middle_slope(objects: FootprintProblem) -> Floats:
-    """The slope (s,) of the ray through the middle of what is seen of each object."""
+    """ORIENTATIONS starts an object (s * ORIENTATIONS, 3), behind the middle of the seen wall."""
     camera = objects.camera
+    right_px = objects.edge_px.mean(1) - camera.cx_px
+    slope = np.asarray(right_px / camera.fx_px)
 
-    middle_px = objects.edge_px.mean(1)
-    right_px = middle_px - camera.cx_px
-    return np.asarray(right_px / camera.fx_px)
-
-
-def _usual_centre(objects: FootprintProblem, slope: Floats) -> Floats:
-    """x_m, z_m and an orientation of 0 (s, 3), behind the wall that the ray of `slope` meets."""
-    camera = objects.camera
-    median_px = np.median(objects.disparity_px, axis=1)
     focal_baseline = camera.fx_px * camera.baseline_m
-    depth_m = focal_baseline / median_px
-    ray_length = np.hypot(slope, 1)
-    distance_m = depth_m * ray_length
+    depth_m = focal_baseline / np.median(objects.disparity_px, axis=1)
+    distance_m = depth_m * np.hypot(slope, 1)
 
     half_m = objects.half_m.mean(1)
     behind = 1 + 0.8 * half_m / distance_m
+    centre = np.stack([slope * depth_m * behind, depth_m * behind, np.zeros_like(depth_m)], axis=1)
 
-    x_m = slope * depth_m * behind
-    z_m = depth_m * behind
-    orientation_rad = np.zeros_like(depth_m)
-    return np.stack([x_m, z_m, orientation_rad], axis=1)
+    orientations = np.linspace(0, np.pi, ORIENTATIONS, endpoint=False)
+    starts = np.repeat(centre, ORIENTATIONS, axis=0)
+    starts[:, 2] = np.tile(orientations, len(centre))
+    starts[:, 2] -= np.repeat(np.arctan(slope), ORIENTATIONS)
+    return starts
 
 
 def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
@@ -207,19 +180,12 @@ def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
         jacobian = np.where(better_matrix, new_jacobian, jacobian)
         damping = np.where(better, damping * 0.2, damping * 8)
 
-    return _solution(best, residuals, jacobian, problem)
-
-
-def _solution(
-    parameters: Floats, residuals: Floats, jacobian: Floats, problem: FootprintProblem
-) -> _Solution:
     weight = _huber_weight(residuals)
     weighted, normal = _weighted_normal(jacobian, weight)
-
     bias_share = problem.bias_sd_px / problem.sd_px
     of_columns = weighted[:, :COLUMNS].sum(1)
     return _Solution(
-        parameters=parameters,
+        parameters=best,
         residuals=residuals * np.sqrt(weight),
         normal=normal,
         bias_gradient=of_columns * bias_share[:, None],
@@ -228,25 +194,16 @@ def _solution(
 
 def _damped_step(residuals: Floats, jacobian: Floats, damping: Floats) -> Floats:
     """The step (s, 3) to subtract, at most MAX_STEP."""
-    weight = _huber_weight(residuals)
-    weighted, normal = _weighted_normal(jacobian, weight)
+    weighted, normal = _weighted_normal(jacobian, _huber_weight(residuals))
     gradient = np.einsum("sri,sr->si", weighted, residuals)
 
-    damped = _damped(normal, damping)
-    solved = np.linalg.solve(damped, gradient[..., None])
-    step = solved[..., 0]
-
-    largest = np.array(MAX_STEP)
-    return np.asarray(step.clip(-largest, largest))
-
-
-def _damped(normal: Floats, damping: Floats) -> Floats:
-    """The normal matrices (s, 3, 3) with their diagonals raised by the damping (s,)."""
     diagonal = np.einsum("sii->si", normal)
     added = diagonal * damping[:, None] + 1e-9
+    damped = normal + added[:, :, None] * np.eye(3)
 
-    damped: Floats = normal + added[:, :, None] * np.eye(3)
-    return damped
+    solved = np.linalg.solve(damped, gradient[..., None])
+    largest = np.array(MAX_STEP)
+    return np.asarray(solved[..., 0].clip(-largest, largest))
 
 
 def _weighted_normal(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats]:
@@ -257,26 +214,21 @@ def _weighted_normal(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats]:
 
 
 def _huber_weight(residuals: Floats) -> Floats:
-    size = np.abs(residuals)
-    safe_size = np.maximum(size, 1e-12)
-
-    weight = np.minimum(1.0, HUBER / safe_size)
-    return np.asarray(weight)
+    safe_size = np.maximum(np.abs(residuals), 1e-12)
+    return np.asarray(np.minimum(1.0, HUBER / safe_size))
 
 
 def _huber_cost(residuals: Floats) -> Floats:
     size = np.abs(residuals)
     quadratic = size**2
     linear = HUBER * (2 * size - HUBER)
-
-    is_inlier = size < HUBER
-    cost = np.where(is_inlier, quadratic, linear)
+    cost = np.where(size < HUBER, quadratic, linear)
     return np.asarray(cost.sum(1))
 
 
 def _covariances(solution: _Solution, problem: FootprintProblem) -> Floats:
-    """(s, 3, 3): of independent errors, of a bias that all disparities share, and of what a hidden
-    edge leaves open.
+    """(s, 3, 3): of independent errors, of a bias that all disparities share, and of the centre if
+    an edge is hidden.
     """
     prior = np.diag([1e-4, 1e-4, 1e-2])
     independent = np.linalg.inv(solution.normal + prior)
@@ -284,17 +236,8 @@ def _covariances(solution: _Solution, problem: FootprintProblem) -> Floats:
     common = np.einsum("sij,sj->si", independent, solution.bias_gradient)
     covariances = np.asarray(independent + _outer(common))
 
-    of_centre = covariances[:, :2, :2]
-    of_centre += _of_hidden_edges(problem)
-    return covariances
-
-
-def _of_hidden_edges(problem: FootprintProblem) -> Floats:
-    """The covariance (s, 2, 2) of a centre that a hidden edge leaves open; 0 where none is."""
-    is_hidden = problem.hidden.any(1)
-    hidden_m2 = np.where(is_hidden, HIDDEN_SD_M**2, 0.0)
-
-    covariances: Floats = hidden_m2[:, None, None] * np.eye(2)
+    hidden_m2 = np.where(problem.hidden.any(1), HIDDEN_SD_M**2, 0.0)
+    covariances[:, :2, :2] += hidden_m2[:, None, None] * np.eye(2)
     return covariances
 
 
@@ -305,26 +248,18 @@ def _outer(vectors: Floats) -> Floats:
     return columns * rows
 
 
-def _misfits(solution: _Solution, problem: FootprintProblem) -> Floats:
-    """(s,): root mean square disparity residual, in standard deviations of one column."""
-    of_columns = solution.residuals[:, :COLUMNS]
-
-    sd_px = problem.sd_px[:, None]
-    error_px = of_columns * sd_px
-
-    squared_px2 = error_px**2
-    rms_px = np.sqrt(squared_px2.mean(1))
-    return np.asarray(rms_px / DISPARITY_SD_PX)
-
-
-def _pose(
+def _mean_pose(
     parameters: Floats, costs: Floats, covariances: Floats, misfit: float, camera: Calibration
 ) -> ObjectPose:
-    """Mean and covariance over all orientations, weighted by likelihood, as bearing and range from
-    the robot.
+    """The mean over all orientations, weighted by likelihood, as bearing and range from the robot,
+    with the standard deviations of this mixture.
     """
-    weight = _likelihood_weight(costs)
-    mean, covariance = _moments(weight, parameters[:, :2], covariances[:, :2, :2])
+    likelihood = np.exp(-0.5 * (costs - costs.min()))
+    weight = np.asarray(likelihood / likelihood.sum())
+    centres = parameters[:, :2]
+    mean: Floats = weight @ centres
+    spread = covariances[:, :2, :2] + _outer(centres - mean)
+    covariance: Floats = np.einsum("s,sij->ij", weight, spread)
 
     forward_m = mean[1] + camera.mount_forward_m
     left_m = -mean[0]
@@ -333,8 +268,8 @@ def _pose(
 
     radial = np.array([-left_m, forward_m]) / range_m
     tangential = np.array([radial[1], -radial[0]])
-    range_sd_m = _sd(covariance, radial)
-    bearing_sd_rad = _sd(covariance, tangential) / range_m
+    range_sd_m = np.sqrt(radial @ covariance @ radial)
+    bearing_sd_rad = np.sqrt(tangential @ covariance @ tangential) / range_m
 
     return ObjectPose(
         bearing_rad=float(np.arctan2(left_m, forward_m)),
@@ -343,26 +278,3 @@ def _pose(
         range_sd_m=float(np.hypot(range_sd_m, MIN_RANGE_SD_M)),
         misfit=float(misfit),
     )
-
-
-def _moments(weight: Floats, centres: Floats, covariances: Floats) -> tuple[Floats, Floats]:
-    """Mean (2,) and covariance (2, 2) of a mixture of centres (s, 2) with covariances (s, 2, 2)."""
-    mean: Floats = weight @ centres
-    scatter = _outer(centres - mean)
-    spread = covariances + scatter
-
-    covariance: Floats = np.einsum("s,sij->ij", weight, spread)
-    return mean, covariance
-
-
-def _likelihood_weight(costs: Floats) -> Floats:
-    """The share (s,) of each solution in the likelihood of all, by their costs (s,)."""
-    excess = costs - costs.min()
-    likelihood = np.exp(-0.5 * excess)
-    return np.asarray(likelihood / likelihood.sum())
-
-
-def _sd(covariance: Floats, direction: Floats) -> Floats:
-    """The standard deviation along `direction`."""
-    variance = direction @ covariance @ direction
-    return np.asarray(np.sqrt(variance))

@@ -1,5 +1,5 @@
-"""The measurement model of a footprint fit: what a rectangle at a pose predicts for the columns of
-a view, and its residuals.
+"""The measurement model of a footprint fit: the disparities and edges that a rectangle at a pose
+predicts for the columns of a view, and their residuals.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ MIN_RANGE_M = 0.5
 STEPS = (1e-3, 1e-3, 1e-4)
 
 # Of the corners of a rectangle, along its two axes.
-_SIGNS_A = np.array([1, 1, -1, -1])
-_SIGNS_B = np.array([1, -1, 1, -1])
+CORNER_SIGNS_A = np.array([1, 1, -1, -1])
+CORNER_SIGNS_B = np.array([1, -1, 1, -1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,12 +61,10 @@ def _residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
     """(s, COLUMNS + 2) residuals in standard deviations, of (s, 3) parameters."""
     camera = problem.camera
     focal_baseline = camera.fx_px * camera.baseline_m
-    inverse_m = _inverse_depths(parameters, problem)
-    disparity_px = focal_baseline * inverse_m
+    disparity_px = focal_baseline * _inverse_depths(parameters, problem)
     error_px = disparity_px - problem.disparity_px
 
-    sd_px = problem.sd_px[:, None]
-    of_columns = error_px / sd_px
+    of_columns = error_px / problem.sd_px[:, None]
     of_edges = _edge_residuals(parameters, problem)
     return np.concatenate([of_columns, of_edges], axis=1)
 
@@ -83,66 +81,41 @@ def _inverse_depths(parameters: Floats, problem: FootprintProblem) -> Floats:
         along_m = x * axis_x + z * axis_z
         gap_m = np.abs(along_m) - half_m
 
+        # A ray approaches the side by so much for each metre of depth, and crosses the gap before
+        # it, unless the side does not face the camera.
         across = problem.slope * axis_x[:, None] + axis_z[:, None]
         towards = across * np.sign(along_m)[:, None]
-        of_side = _inverse_depths_of_side(towards, gap_m)
+        facing = gap_m > 1e-3
+        safe_gap_m = np.where(facing, gap_m, 1.0)
+        of_side = np.where(facing[:, None], towards / safe_gap_m[:, None], np.inf)
         inverse = np.minimum(inverse, of_side)
 
     met = np.isfinite(inverse)
     return np.where(met, inverse, 1 / MIN_RANGE_M)
 
 
-def _inverse_depths_of_side(towards: Floats, gap_m: Floats) -> Floats:
-    """1 / depth in metres, (s, COLUMNS), at which rays that approach a side by `towards` for each
-    metre of depth cross the gap (s,) before it; infinite where it does not face the camera.
-    """
-    facing = gap_m > 1e-3
-    safe_gap_m = np.where(facing, gap_m, 1.0)
-
-    inverse = towards / safe_gap_m[:, None]
-    return np.where(facing[:, None], inverse, np.inf)
-
-
 def _edge_residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
     """(s, 2): from each edge to the outermost corner of the rectangle, in standard deviations. The
     true end at a hidden edge may lie anywhere farther out.
     """
-    corners_px = _corner_columns(parameters, problem)
-    first_px = corners_px.min(1)
-    last_px = corners_px.max(1)
-    outermost_px = np.stack([first_px, last_px], axis=1)
+    x, z, orientation = parameters.T[:, :, None]
+    a = problem.half_m[:, :1] * CORNER_SIGNS_A
+    b = problem.half_m[:, 1:] * CORNER_SIGNS_B
+    cos = np.cos(orientation)
+    sin = np.sin(orientation)
+    corner_x = x + a * cos - b * sin
+    corner_z = z + a * sin + b * cos
 
+    camera = problem.camera
+    depth_m = np.maximum(corner_z, MIN_RANGE_M)
+    corners_px = camera.cx_px + camera.fx_px * corner_x / depth_m
+    outermost_px = np.stack([corners_px.min(1), corners_px.max(1)], axis=1)
     error_px = outermost_px - problem.edge_px
 
-    outwards = np.array([-1.0, 1.0])
-    outward_px = error_px * outwards
+    outward_px = error_px * np.array([-1.0, 1.0])
     is_free = problem.hidden & (outward_px > 0)
     counted_px = np.where(is_free, 0.0, error_px)
     return counted_px / EDGE_SD_PX
-
-
-def _corner_columns(parameters: Floats, problem: FootprintProblem) -> Floats:
-    """The columns (s, 4) of the rectangle's corners."""
-    camera = problem.camera
-    corner_x, corner_z = _corners(parameters, problem.half_m)
-
-    depth_m = np.maximum(corner_z, MIN_RANGE_M)
-    right_px = camera.fx_px * corner_x / depth_m
-    return np.asarray(camera.cx_px + right_px)
-
-
-def _corners(parameters: Floats, half_m: Floats) -> tuple[Floats, Floats]:
-    """x and z (s, 4) of the corners of rectangles with half sides (s, 2)."""
-    x, z, orientation = parameters.T[:, :, None]
-    a = half_m[:, :1] * _SIGNS_A
-    b = half_m[:, 1:] * _SIGNS_B
-
-    cos = np.cos(orientation)
-    sin = np.sin(orientation)
-
-    corner_x = x + a * cos - b * sin
-    corner_z = z + a * sin + b * cos
-    return corner_x, corner_z
 
 
 def linearized(parameters: Floats, copies: FootprintProblem) -> tuple[Floats, Floats]:
@@ -159,9 +132,6 @@ def linearized(parameters: Floats, copies: FootprintProblem) -> tuple[Floats, Fl
     values = _residuals(np.concatenate(evaluated), copies)
     residuals, *others = np.split(values, len(evaluated))
 
-    derivatives = []
-    for other, step in zip(others, STEPS, strict=True):
-        change = other - residuals
-        derivatives.append(change / step)
-
+    changes = zip(others, STEPS, strict=True)
+    derivatives = [(other - residuals) / step for other, step in changes]
     return residuals, np.stack(derivatives, axis=2)

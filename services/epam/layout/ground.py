@@ -12,10 +12,10 @@ from cogmap.services.epam.layout.ground_plane import GroundPlane, fit, focal_bas
 
 MAX_RANGE_M = 15.0
 CELL_M = 0.5
-# What is nearer than the ground by more than this is upright, if it is larger than a speck.
+# A pixel that is nearer than the ground by more than this is upright, unless it is a speck.
 UPRIGHT_PX = 3.0
 UPRIGHT_SHARE = 0.02
-_SPECK = np.ones((5, 3), np.uint8)
+SPECK = np.ones((5, 3), np.uint8)
 # Neighbourhood of a boundary pixel in which an upright thing may hide the rest of the road.
 BESIDE_PX = 4
 ABOVE_PX = 12
@@ -30,112 +30,60 @@ def project(likelihood: Singles, depth_m: Singles, camera: Calibration) -> tuple
     float32 (n, 2) each.
 
     `likelihood` and `depth_m` are (h, w). A pixel is road if its likelihood is at least 0.5; the
-    boundary lies between pixels, where it would be 0.5. Both are limited to MAX_RANGE_M and thinned
-    to the mean point of each cell of CELL_M. No boundary is claimed where the image ends or where
-    something upright hides what is behind it.
+    boundary lies between pixels, at 0.5. Both are limited to MAX_RANGE_M and thinned to the mean
+    point of each cell of CELL_M. No boundary is claimed at the image's border or behind something
+    upright.
     """
     likelihood = likelihood.astype(np.float32, copy=False)
     mask = likelihood >= 0.5
 
-    disparity_px = _disparity_px(depth_m, camera)
+    unknown_px = np.zeros(depth_m.shape)
+    disparity_px = np.divide(focal_baseline(camera), depth_m, out=unknown_px, where=depth_m > 0)
     plane = fit(mask, disparity_px, camera)
     ground_px = plane.disparity_image_px(mask.shape, camera)
 
-    upright = _upright(disparity_px, ground_px)
-    near = ground_px > min_disparity_px(camera)
+    nearer_px = disparity_px - np.maximum(ground_px, 0.0)
+    nearer = nearer_px > UPRIGHT_PX + UPRIGHT_SHARE * disparity_px
+    upright = cv2.morphologyEx(nearer.astype(np.uint8), cv2.MORPH_OPEN, SPECK) > 0
+
+    near = ground_px > focal_baseline(camera) / MAX_RANGE_M
     road_rows, road_columns = np.nonzero(mask & ~upright & near)
     road_m = _on_ground(road_rows, road_columns, plane, camera)
 
+    # Ground with nothing upright before it nearby.
+    kernel = np.ones((ABOVE_PX + 1 + BELOW_PX, 2 * BESIDE_PX + 1), np.uint8)
     upright_px = np.where(upright, disparity_px, 0.0).astype(np.float32)
-    visible_ground = _visible_ground(upright_px, ground_px)
-
-    end_rows, end_columns = _boundary_pixels(likelihood, mask, visible_ground)
-    boundary_m = _on_ground(end_rows, end_columns, plane, camera)
-
-    return thin(road_m), thin(boundary_m)
-
-
-def min_disparity_px(camera: Calibration) -> float:
-    """Return the disparity at MAX_RANGE_M."""
-    return focal_baseline(camera) / MAX_RANGE_M
-
-
-def _disparity_px(depth_m: Singles, camera: Calibration) -> Floats:
-    """Of each pixel (h, w), 0 where depth is unknown."""
-    known = depth_m > 0
-    unknown_px = np.zeros(depth_m.shape)
-
-    return np.divide(focal_baseline(camera), depth_m, out=unknown_px, where=known)
-
-
-def _upright(disparity_px: Floats, ground_px: Floats) -> Booleans:
-    """Which pixels show something that stands on the ground, (h, w)."""
-    horizon_px = np.maximum(ground_px, 0.0)
-    nearer_px = disparity_px - horizon_px
-    limit_px = UPRIGHT_PX + UPRIGHT_SHARE * disparity_px
-
-    nearer = nearer_px > limit_px
-    as_bytes = nearer.astype(np.uint8)
-    opened = cv2.morphologyEx(as_bytes, cv2.MORPH_OPEN, _SPECK)
-
-    return np.asarray(opened > 0)
-
-
-def _visible_ground(upright_px: Singles, ground_px: Floats) -> Booleans:
-    """Which pixels show ground with nothing upright before it nearby, (h, w)."""
-    height = ABOVE_PX + 1 + BELOW_PX
-    width = 2 * BESIDE_PX + 1
-    kernel = np.ones((height, width), np.uint8)
-
     nearest_px = cv2.dilate(upright_px, kernel, anchor=(BESIDE_PX, ABOVE_PX))
-    limit_px = HIDING_SHARE * ground_px - HIDING_PX
-    is_hidden = nearest_px >= limit_px
+    is_hidden = nearest_px >= HIDING_SHARE * ground_px - HIDING_PX
+    visible_ground = np.asarray((ground_px > 0) & ~is_hidden)
 
-    is_ground = ground_px > 0
-    return np.asarray(is_ground & ~is_hidden)
-
-
-def _boundary_pixels(
-    likelihood: Singles, mask: Booleans, visible_ground: Booleans
-) -> tuple[Floats, Floats]:
-    """Rows and columns, fractional, where the road ends on visible ground inside the image."""
     across_rows, across_columns = _crossings(likelihood, mask, visible_ground)
     down_columns, down_rows = _crossings(likelihood.T, mask.T, visible_ground.T)
-
     rows = np.concatenate([across_rows, down_rows])
     columns = np.concatenate([across_columns, down_columns])
 
-    height, width = mask.shape
-    inside = _inside(rows, height) & _inside(columns, width)
-    return rows[inside], columns[inside]
+    middle_row, middle_column = (np.array(mask.shape) - 1) / 2
+    inside = np.abs(rows - middle_row) < middle_row - BORDER_PX
+    inside &= np.abs(columns - middle_column) < middle_column - BORDER_PX
+    boundary_m = _on_ground(rows[inside], columns[inside], plane, camera)
 
-
-def _inside(at: Floats, size: int) -> Booleans:
-    """Which of these rows or columns are farther than BORDER_PX from the image's border."""
-    middle = (size - 1) / 2
-    from_middle = np.abs(at - middle)
-    return np.asarray(from_middle < middle - BORDER_PX)
+    return thin(road_m), thin(boundary_m)
 
 
 def _crossings(
     likelihood: Singles, mask: Booleans, visible_ground: Booleans
 ) -> tuple[Floats, Floats]:
-    """Rows and columns where the likelihood is 0.5 between neighbours in a row, if both show
-    visible ground.
+    """Rows and fractional columns at which the likelihood is 0.5 between neighbours in a row, if
+    both show visible ground.
     """
-    left = slice(None, -1)
-    right = slice(1, None)
-    is_visible = visible_ground[:, left] & visible_ground[:, right]
-    changes = mask[:, left] != mask[:, right]
+    is_visible = visible_ground[:, :-1] & visible_ground[:, 1:]
+    changes = mask[:, :-1] != mask[:, 1:]
     rows, columns = np.nonzero(is_visible & changes)
 
     first = likelihood[rows, columns]
     second = likelihood[rows, columns + 1]
-    rise = second - first
-    share = (0.5 - first) / rise
-
-    crossed_columns = np.asarray(columns + share, np.float64)
-    return rows.astype(np.float64), crossed_columns
+    share = (0.5 - first) / (second - first)
+    return rows.astype(np.float64), np.asarray(columns + share, np.float64)
 
 
 def _on_ground(
@@ -143,7 +91,7 @@ def _on_ground(
 ) -> Floats:
     """The ground points (n, 2) that these pixels show; those beyond MAX_RANGE_M are left out."""
     disparity_px = plane.disparity_px(rows, columns, camera)
-    near = disparity_px > min_disparity_px(camera)
+    near = disparity_px > focal_baseline(camera) / MAX_RANGE_M
     depth_m = focal_baseline(camera) / disparity_px[near]
     forward_m = depth_m + camera.mount_forward_m
 
@@ -158,33 +106,14 @@ def thin(points_m: Floats) -> Singles:
     ranges_m = np.hypot(points_m[:, 0], points_m[:, 1])
     near_m = points_m[ranges_m <= MAX_RANGE_M]
 
-    cell = _cell_numbers(near_m)
-    means_m = _means_m(near_m, cell)
-    return np.asarray(means_m, np.float32)
+    reach = round(MAX_RANGE_M / CELL_M) + 1
+    row, column = np.floor(near_m / CELL_M).astype(np.intp).T + reach
+    cell = 2 * reach * row + column
 
-
-def _means_m(points_m: Floats, cell: npt.NDArray[np.intp]) -> Floats:
-    """The mean (k, 2) of the points (n, 2) in each of the cells that they are in, (n,)."""
-    x_m, y_m = points_m.T
+    x_m, y_m = near_m.T
     sum_x_m = np.bincount(cell, x_m, minlength=1)
     sum_y_m = np.bincount(cell, y_m, minlength=1)
     sums_m = np.stack([sum_x_m, sum_y_m], axis=1)
-
     count = np.bincount(cell, minlength=1)
     occupied = np.flatnonzero(count)
-    divisor = count[occupied, None]
-    means_m: Floats = sums_m[occupied] / divisor
-    return means_m
-
-
-def _cell_numbers(points_m: Floats) -> npt.NDArray[np.intp]:
-    """The number of the cell of each point (n, 2), x before y."""
-    reach = round(MAX_RANGE_M / CELL_M) + 1
-    in_cells = points_m / CELL_M
-    lower = np.floor(in_cells)
-    cells = lower.astype(np.intp)
-
-    row, column = cells.T + reach
-    columns = 2 * reach
-    numbers = row * columns + column
-    return np.asarray(numbers)
+    return np.asarray(sums_m[occupied] / count[occupied, None], np.float32)

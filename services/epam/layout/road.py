@@ -1,5 +1,5 @@
-"""Which pixels show road: a fully-convolutional network that also receives where in the image each
-pixel is, the spatial prior of the paper (section 5.1).
+"""Finds the pixels that show road: a fully-convolutional network that also receives the position of
+each pixel in the image, the spatial prior of the paper (section 5.1).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MIN_GREY = 20.0
 MIN_CONTRAST = 3.0
 MIN_ROAD_SHARE = 0.002
 MAX_HOLE_SHARE = 0.0005
-_OPENING = np.ones((3, 3), np.uint8)
+OPENING = np.ones((3, 3), np.uint8)
 
 
 class RoadSegmenter:
@@ -66,7 +66,7 @@ class RoadSegmenter:
 
 class RoadPass(NamedTuple):
     """Road that is being found in an image of that size; `outputs` are those of the network, None
-    where the image has no contrast.
+    if the image has no contrast.
     """
 
     height_px: int
@@ -84,10 +84,17 @@ class RoadPass(NamedTuple):
         (output,) = self.outputs.result()
         unpadded = output[0, 0, PADDING_PX:-PADDING_PX]
         size = (self.width_px, self.height_px)
-        log_odds = cv2.resize(unpadded, size, interpolation=cv2.INTER_LINEAR)
+        log_odds = np.asarray(cv2.resize(unpadded, size), np.float32)
+        likelihood = np.asarray(1 / (1 + np.exp(-log_odds)), np.float32)
 
-        likelihood = _probability(np.asarray(log_odds, np.float32))
-        return _denoised(likelihood)
+        # Specks and thin lines are removed from the road, and small holes filled.
+        road = likelihood >= 0.5
+        opened = cv2.morphologyEx(road.astype(np.uint8), cv2.MORPH_OPEN, OPENING)
+        without_specks = _large_components(opened.astype(bool), MIN_ROAD_SHARE)
+        background = _large_components(~without_specks, MAX_HOLE_SHARE)
+        likelihood[road & background] = 0.0
+        likelihood[~road & ~background] = 1.0
+        return likelihood
 
 
 def load(path: Path = DEFAULT_PATH, processor: Processor = "cpu") -> RoadSegmenter:
@@ -108,8 +115,10 @@ def network_input(small: Bytes) -> Singles:
     _, _, height, width = INPUT_SHAPE
     values = np.empty((count, CHANNELS, height, width), np.float32)
 
-    scale = _gain(small) / 64
-    padded = _padded(small)
+    brightness = small.mean((1, 2, 3), dtype=np.float32)
+    gain = np.asarray(MEAN_GREY / np.maximum(brightness, MIN_GREY))
+    scale = gain[:, None, None, None] / 64
+    padded = np.pad(small, ((0, 0), (PADDING_PX, PADDING_PX), (0, 0), (0, 0)), mode="edge")
     colours = values[:, :3]
     colours[:] = padded.transpose(0, 3, 1, 2)
     colours[:] = colours * scale - 2
@@ -121,50 +130,11 @@ def network_input(small: Bytes) -> Singles:
     return values
 
 
-def _padded(small: Bytes) -> Bytes:
-    """Images (n, h, w, 3) with rows above and below."""
-    rows = (PADDING_PX, PADDING_PX)
-    unpadded = (0, 0)
-    return np.pad(small, (unpadded, rows, unpadded, unpadded), mode="edge")
-
-
-def _probability(log_odds: Singles) -> Singles:
-    odds_against = np.exp(-log_odds)
-    odds_sum = 1 + odds_against
-    return np.asarray(1 / odds_sum, np.float32)
-
-
-def _gain(small: Bytes) -> Singles:
-    """The factor (n, 1, 1, 1) by which each image's mean becomes MEAN_GREY."""
-    brightness = small.mean((1, 2, 3), dtype=np.float32)
-    safe_brightness = np.maximum(brightness, MIN_GREY)
-
-    gain = MEAN_GREY / safe_brightness
-    return np.asarray(gain[:, None, None, None])
-
-
-def _denoised(likelihood: Singles) -> Singles:
-    """`likelihood` with specks and thin lines removed from the road, and small holes filled."""
-    road = likelihood >= 0.5
-    opened = cv2.morphologyEx(road.astype(np.uint8), cv2.MORPH_OPEN, _OPENING)
-    without_specks = _large_components(opened.astype(bool), MIN_ROAD_SHARE)
-    background = _large_components(~without_specks, MAX_HOLE_SHARE)
-
-    is_speck = road & background
-    is_hole = ~road & ~background
-    likelihood[is_speck] = 0.0
-    likelihood[is_hole] = 1.0
-    return likelihood
-
-
 def _large_components(mask: Booleans, min_share: float) -> Booleans:
     """The connected components of `mask` that cover at least `min_share` of the image, (h, w)."""
     found = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     _, component, stats, _ = found
 
-    area_px = stats[:, cv2.CC_STAT_AREA]
-
-    min_area_px = min_share * mask.size
-    kept = area_px >= min_area_px
+    kept = stats[:, cv2.CC_STAT_AREA] >= min_share * mask.size
     kept[0] = False
     return np.asarray(kept[component])

@@ -1,5 +1,5 @@
-"""Places recognized by the sequence of views that leads to them: the paper's future work, for where
-no landmark is in sight.
+"""Places recognized by the sequence of views that leads to them: the paper's future work, for
+places without a landmark in sight.
 
 A single view may be ambiguous, so views are accumulated while the robot moves: a Bayes filter (a
 hidden Markov model) holds the probability that the robot is where a remembered view was taken, or
@@ -11,15 +11,12 @@ so memory grows with what is new.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import Annotated
 
-import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Bytes, Floats, Singles
 from cogmap.schemas.array import Array
-from cogmap.schemas.base import PositiveShare
 from cogmap.schemas.sensing import PlaceMatch, RememberedView
 from cogmap.services.epam.places.descriptor import (
     DESCRIPTOR_BYTES,
@@ -29,8 +26,9 @@ from cogmap.services.epam.places.descriptor import (
     unit_vectors,
 )
 
-# Chosen on laps in the towns of seeds 2007 to 2010, where every threshold of at least 0.6 gave no
-# false match.
+# Chosen on laps in the towns of seeds 2007 to 2010, in which every threshold of at least 0.6 gave
+# no false match.
+MATCH_THRESHOLD = 0.9
 P_ADVANCE = (0.1, 0.4, 0.35, 0.15)
 P_FOUND = 0.02
 P_LOST = 0.03
@@ -38,45 +36,24 @@ LOG_ODDS_SLOPE = 15.0
 EVEN_SIMILARITY = 0.7
 MAX_LOG_ODDS = 3.0
 NEIGHBOURS = 4
+# Consecutive views that are more similar show a robot at rest.
+SIMILARITY_AT_REST = 0.97
+# So many last views do not match.
+RECENT_VIEWS = 30
+# Of views: some hours of driving; each takes 2 KB.
+CAPACITY = 20_000
 INITIAL_CAPACITY = 256
+# Several are forgotten at once, since all other vectors move up.
 FORGOTTEN_SHARE = 0.05
 
 
-class PlaceConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Limits of place recognition."""
-
-    threshold: Annotated[
-        PositiveShare,
-        msgspec.Meta(description="smallest probability of a match, over 0, at most 1"),
-    ] = 0.9
-    still: Annotated[
-        PositiveShare,
-        msgspec.Meta(
-            description="consecutive views that are more similar, over 0, at most 1, show a robot "
-            "at rest"
-        ),
-    ] = 0.97
-    recent: Annotated[
-        int,
-        msgspec.Meta(
-            ge=1, le=10_000, description="number of last views that do not match, 1 to 10,000"
-        ),
-    ] = 30
-    capacity: Annotated[
-        int,
-        msgspec.Meta(
-            ge=100,
-            le=100_000,
-            description="number of views remembered, 100 to 100,000; the oldest are forgotten",
-        ),
-    ] = 20_000
-
-
 class PlaceRecognizer:
-    """The views remembered, and the probability that the robot is at each of them again."""
+    """The views remembered, at most `capacity`, the oldest being forgotten, and the probability
+    that the robot is at each of them again.
+    """
 
-    def __init__(self, config: PlaceConfig | None = None) -> None:
-        self._config = config or PlaceConfig()
+    def __init__(self, capacity: int = CAPACITY) -> None:
+        self._capacity = capacity
         self._views: list[RememberedView] = []
         self._vectors: Singles = np.empty((INITIAL_CAPACITY, DESCRIPTOR_BYTES), np.float32)
         self._step_of_view = np.empty(0, np.int64)
@@ -107,10 +84,12 @@ class PlaceRecognizer:
             return [], []
 
         vectors = unit_vectors(codes)
-        if self._is_at_rest(vectors[UNSHIFTED]):
+        vector = vectors[UNSHIFTED]
+        last = self._last_vector
+        if last is not None and float(vector @ last) > SIMILARITY_AT_REST:
             return list(self._matches), []
 
-        self._last_vector = vectors[UNSHIFTED]
+        self._last_vector = vector
         self._step += 1
         self._update_belief(vectors)
         self._matches = self._best_match()
@@ -129,15 +108,20 @@ class PlaceRecognizer:
         if not restored:
             return
 
-        vectors = unit_vectors(np.stack([_code(view) for view in restored]))
+        codes = []
+        for view in restored:
+            code = view.code
+            if (code.dtype, code.shape) != ("|u1", (DESCRIPTOR_BYTES,)):
+                raise MessageError(
+                    f"remembered view {view.frame}: expected a uint8 code of {DESCRIPTOR_BYTES}, "
+                    f"got {code.dtype} {code.shape}; delete EPAM's journal"
+                )
+            codes.append(code.numpy().astype(np.uint8, copy=False))
+
+        vectors = unit_vectors(np.stack(codes))
         self._step += len(restored)
         self._remember(restored, vectors)
         self._last_vector = vectors[-1]
-
-    def _is_at_rest(self, vector: Singles) -> bool:
-        if self._last_vector is None:
-            return False
-        return float(vector @ self._last_vector) > self._config.still
 
     def _update_belief(self, vectors: Singles) -> None:
         """One step of the filter: prediction, then the evidence of `vectors`, by the most similar
@@ -146,7 +130,12 @@ class PlaceRecognizer:
         if not self._views:
             return
 
-        predicted = self._predicted()
+        # The robot has advanced by none to three remembered views.
+        count = len(self._views)
+        predicted = np.zeros(count)
+        for steps, p_advance in enumerate(P_ADVANCE[:count]):
+            predicted[steps:] += p_advance * self._belief[: count - steps]
+
         found = P_FOUND * self._p_new
         p_new = 1.0 - (1 - P_LOST) * predicted.sum() - found
 
@@ -156,35 +145,16 @@ class PlaceRecognizer:
         self._belief = belief / total
         self._p_new = p_new / total
 
-    def _predicted(self) -> Floats:
-        """The belief after the robot has advanced by none to three remembered views."""
-        count = len(self._views)
-        predicted = np.zeros(count)
-        for steps, p_advance in enumerate(P_ADVANCE[:count]):
-            last = count - steps
-            before = self._belief[:last]
-            predicted[steps:] += p_advance * before
-
-        return predicted
-
     def _likelihood_ratios(self, vectors: Singles) -> Floats:
         """How much likelier each remembered view's place makes the observed one than another place;
         0 for recent views.
         """
-        count = len(self._views)
-        known = self._vectors[:count]
-        similarities = known @ vectors.T
-        most_similar = similarities.max(axis=1)
-        highest = most_similar.astype(np.float64)
-
+        similarities = self._vectors[: len(self._views)] @ vectors.T
+        highest = similarities.max(axis=1).astype(np.float64)
         log_odds = LOG_ODDS_SLOPE * (highest - EVEN_SIMILARITY)
-        limited = log_odds.clip(-MAX_LOG_ODDS, MAX_LOG_ODDS)
-        ratios = np.exp(limited)
+        ratios = np.exp(log_odds.clip(-MAX_LOG_ODDS, MAX_LOG_ODDS))
 
-        first_recent_step = self._step - self._config.recent + 1
-        is_recent = self._step_of_view >= first_recent_step
-        ratios[is_recent] = 0.0
-
+        ratios[self._step_of_view > self._step - RECENT_VIEWS] = 0.0
         return np.asarray(ratios)
 
     def _best_match(self) -> list[PlaceMatch]:
@@ -195,11 +165,9 @@ class PlaceRecognizer:
             return []
 
         best = int(self._belief.argmax())
-        first = max(0, best - NEIGHBOURS)
-        last = best + NEIGHBOURS
-        probability = float(self._belief[first : last + 1].sum())
-        score = min(1.0, probability)
-        if score < self._config.threshold:
+        neighbours = slice(max(0, best - NEIGHBOURS), best + NEIGHBOURS + 1)
+        score = min(1.0, float(self._belief[neighbours].sum()))
+        if score < MATCH_THRESHOLD:
             return []
 
         view = self._views[best]
@@ -208,52 +176,23 @@ class PlaceRecognizer:
     def _remember(self, views: list[RememberedView], vectors: Singles) -> None:
         before = len(self._views)
         count = before + len(views)
-        self._reserve(count)
+        if count > len(self._vectors):
+            larger = np.empty((2 * count, DESCRIPTOR_BYTES), np.float32)
+            larger[:before] = self._vectors[:before]
+            self._vectors = larger
 
         self._views += views
         self._vectors[before:count] = vectors
         steps = np.arange(self._step - len(views), self._step) + 1
-        unlikely = np.zeros(len(views))
-
         self._step_of_view = np.concatenate([self._step_of_view, steps])
-        self._belief = np.concatenate([self._belief, unlikely])
-
-        # Several at once, since all other vectors move up.
-        capacity = self._config.capacity
-        if count > capacity:
-            kept = round(capacity * (1 - FORGOTTEN_SHARE))
-            self._forget(count - kept)
-
-    def _reserve(self, count: int) -> None:
-        """Make room for `count` vectors."""
-        if count <= len(self._vectors):
+        self._belief = np.concatenate([self._belief, np.zeros(len(views))])
+        if count <= self._capacity:
             return
 
-        known_count = len(self._views)
-        known = self._vectors[:known_count]
-        larger = np.empty((2 * count, DESCRIPTOR_BYTES), np.float32)
-        larger[:known_count] = known
-        self._vectors = larger
-
-    def _forget(self, oldest: int) -> None:
-        """Forget this number of the oldest views."""
-        forgotten = self._belief[:oldest]
-        self._p_new += float(forgotten.sum())
-
-        count = len(self._views)
+        oldest = count - round(self._capacity * (1 - FORGOTTEN_SHARE))
+        self._p_new += float(self._belief[:oldest].sum())
         kept = self._vectors[oldest:count]
         self._vectors[: len(kept)] = kept
-
         self._views = self._views[oldest:]
         self._step_of_view = self._step_of_view[oldest:]
         self._belief = self._belief[oldest:]
-
-
-def _code(view: RememberedView) -> Bytes:
-    code = view.code
-    if (code.dtype, code.shape) != ("|u1", (DESCRIPTOR_BYTES,)):
-        raise MessageError(
-            f"remembered view {view.frame}: expected a uint8 code of {DESCRIPTOR_BYTES}, "
-            f"got {code.dtype} {code.shape}; delete EPAM's journal"
-        )
-    return code.numpy().astype(np.uint8, copy=False)

@@ -10,7 +10,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cogmap.geometry.arrays import Booleans, Bytes, Singles
+from cogmap.geometry.arrays import Bytes, Singles
 from cogmap.schemas.sensing import Calibration
 from cogmap.services.epam.recognition.segments import Segment
 
@@ -25,40 +25,27 @@ STRIDE_PX = 2
 
 
 def surroundings(image: Bytes, depth_m: Singles, camera: Calibration) -> Singles:
-    """Return the median colours of ground and sky, as `colours`, float32 (6,), 0 for what is not in
-    view.
+    """Return the median colours of ground and sky, as `colours`, float32 (6,), 0 for one that is
+    not in view.
 
-    The sky is what has no depth, above the horizon.
+    Pixels without depth above the horizon show the sky.
     """
     image = image[::STRIDE_PX, ::STRIDE_PX]
     depth_m = depth_m[::STRIDE_PX, ::STRIDE_PX]
-    down = _downward_slopes(len(depth_m), camera)
+    rows = STRIDE_PX * np.arange(len(depth_m), dtype=np.float32)[:, None]
+    down = (rows - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
     height_m = camera.mount_height_m - down * depth_m
-    is_known = depth_m > 0
-    is_low = height_m < GROUND_M
 
-    ground = is_known & (down > 0) & is_low
+    is_known = depth_m > 0
+    ground = is_known & (down > 0) & (height_m < GROUND_M)
     sky = ~is_known & (down < 0)
 
-    of_ground = _median_colour(image[ground])
-    of_sky = _median_colour(image[sky])
-    return np.concatenate([of_ground, of_sky])
-
-
-def _downward_slopes(count: int, camera: Calibration) -> Singles:
-    """The slopes of the rays of `count` rows, every STRIDE_PX, (count, 1)."""
-    numbers = np.arange(count, dtype=np.float32)
-    rows = STRIDE_PX * numbers
-    below_px = rows - np.float32(camera.cy_px)
-
-    slopes = below_px / np.float32(camera.fy_px)
-    return np.asarray(slopes[:, None])
-
-
-def _median_colour(pixels: Bytes) -> Singles:
-    if len(pixels) < MIN_PIXELS:
-        return np.zeros(3, np.float32)
-    return colours(np.median(pixels, axis=0))
+    medians = np.zeros((2, 3), np.float32)
+    for row, is_shown in enumerate((ground, sky)):
+        pixels = image[is_shown]
+        if len(pixels) >= MIN_PIXELS:
+            medians[row] = colours(np.median(pixels, axis=0))
+    return medians.ravel()
 
 
 def colours(levels: npt.ArrayLike) -> Singles:
@@ -74,91 +61,46 @@ def crop(
     Channels are three colours, 0 outside the segment; its mask; how much farther than the segment
     each pixel is; the logarithm of the side's length in metres; and the `surroundings`.
     """
-    first_column, first_row, side = _square(segment)
-    source, target = _overlap(first_column, first_row, side, depth_m.shape)
-    mask = segment.mask[source]
-    distance_m = _distance_m(depth_m[source], mask)
+    # A square about the segment, with a margin; parts of it may be outside the image.
+    left, top, width, height = segment.box_px
+    side = round(max(width, height) * (1 + 2 * MARGIN))
+    rows, rows_in_square = _overlap(top + height // 2 - side // 2, side, len(depth_m))
+    columns, columns_in_square = _overlap(left + width // 2 - side // 2, side, depth_m.shape[1])
+    mask = segment.mask[rows, columns]
+    square_m = depth_m[rows, columns]
+    is_known = square_m > 0
+    own_m = square_m[is_known & mask]
+    distance_m = float(np.median(own_m)) if len(own_m) else UNKNOWN_DISTANCE_M
 
     shown = np.zeros((side, side, 4), np.float32)
-    inside = shown[target]
-    inside[..., :3] = colours(image[source]) * mask[..., None]
+    inside = shown[rows_in_square, columns_in_square]
+    inside[..., :3] = colours(image[rows, columns]) * mask[..., None]
     inside[..., 3] = mask
-    relief = np.zeros((side, side), np.float32)
-    relief[target] = _relief(depth_m[source], distance_m)
 
+    relief = np.zeros((side, side), np.float32)
+    log_ratio = np.log(np.where(is_known, square_m, distance_m) / distance_m)
+    relief[rows_in_square, columns_in_square] = (RELIEF * log_ratio).clip(-1, 1)
+
+    side_m = side * distance_m / focal_px
     values = np.empty((CHANNELS, SIDE_PX, SIDE_PX), np.float32)
     values[:4] = _resized(shown).transpose(2, 0, 1)
     values[4] = _resized(relief)
-    values[5] = _size_level(side * distance_m / focal_px)
+    values[5] = float(np.log(max(side_m, 1.0)) / 2.0 - 1.0)
     values[6:] = around[:, None, None]
     return values
 
 
-def _size_level(side_m: float) -> float:
-    """The length of a square's side, as the network receives it."""
-    log_side = np.log(max(side_m, 1.0))
-    return float(log_side / 2.0 - 1.0)
-
-
-def _square(segment: Segment) -> tuple[int, int, int]:
-    """The first column and row, and the side, of the square about `segment` with its margin, in
-    pixels; parts of it may be outside the image.
+def _overlap(start: int, length: int, size: int) -> tuple[slice, slice]:
+    """The part of so many pixels from `start` on that is inside an image of `size`: where it is in
+    the image, and where among those pixels.
     """
-    left, top, width, height = segment.box_px
-    longer = max(width, height)
-    side = round(longer * (1 + 2 * MARGIN))
-    half = side // 2
-
-    middle_column = left + width // 2
-    middle_row = top + height // 2
-    return middle_column - half, middle_row - half, side
+    first = max(start, 0)
+    last = min(start + length, size)
+    return slice(first, last), slice(first - start, last - start)
 
 
 def _resized(square: Singles) -> Singles:
-    """To SIDE_PX."""
-    is_larger = len(square) > SIDE_PX
-    interpolation = cv2.INTER_AREA if is_larger else cv2.INTER_LINEAR
-    size = (SIDE_PX, SIDE_PX)
-
-    resized = cv2.resize(square, size, interpolation=interpolation)
+    """`square` with sides of SIDE_PX."""
+    interpolation = cv2.INTER_AREA if len(square) > SIDE_PX else cv2.INTER_LINEAR
+    resized = cv2.resize(square, (SIDE_PX, SIDE_PX), interpolation=interpolation)
     return resized.astype(np.float32, copy=False)
-
-
-def _distance_m(depth_m: Singles, mask: Booleans) -> float:
-    """The median known depth within `mask`."""
-    known = depth_m > 0
-    own_m = depth_m[known & mask]
-    if not len(own_m):
-        return UNKNOWN_DISTANCE_M
-    return float(np.median(own_m))
-
-
-def _relief(depth_m: Singles, distance_m: float) -> Singles:
-    """Log ratio of depth to `distance_m`, scaled and clipped to -1 to 1, 0 where unknown."""
-    known = depth_m > 0
-    filled_m = np.where(known, depth_m, distance_m)
-    ratio = np.log(filled_m / distance_m)
-
-    scaled = RELIEF * ratio
-    return np.asarray(scaled.clip(-1, 1))
-
-
-def _overlap(
-    left: int, top: int, side: int, size: tuple[int, ...]
-) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Of the square at `left`, `top`, the part inside an image of `size` (h, w): its rows and
-    columns in the image, and in the square.
-    """
-    height, width = size
-    rows, rows_in_square = _overlap_1d(top, side, height)
-    columns, columns_in_square = _overlap_1d(left, side, width)
-    return (rows, columns), (rows_in_square, columns_in_square)
-
-
-def _overlap_1d(start: int, length: int, size: int) -> tuple[slice, slice]:
-    first = max(start, 0)
-    last = min(start + length, size)
-
-    source = slice(first, last)
-    target = slice(first - start, last - start)
-    return source, target

@@ -1,4 +1,4 @@
-"""What kinds of buildings are used for: knowledge that comes with what EPAM was trained on."""
+"""Functions of buildings: knowledge that comes with what EPAM was trained on."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ LABELS_OF = {
 }
 """The labels of EPAM's own objects, by function."""
 
-_FUNCTIONS = {label: function for function, labels in LABELS_OF.items() for label in labels}
+FUNCTIONS = {label: function for function, labels in LABELS_OF.items() for label in labels}
 
 
 def function_of(label: str) -> str:
-    """What an object with that label is used for; empty where it is not known, as of one that was
-    learned in an encounter.
+    """Return the function of an object with that label; empty if it is not known, as of one that
+    was learned in an encounter.
     """
-    return _FUNCTIONS.get(label, "")
+    return FUNCTIONS.get(label, "")

@@ -1,5 +1,5 @@
-"""What a segment shows: a convolutional network embeds it, and the embedding is compared with
-prototypes.
+"""Recognizes what a segment shows: a convolutional network embeds it, and the embedding is compared
+with prototypes.
 
 An embedding is a direction: what looks alike points the same way, from any side and in any light,
 also where no label was taught. Prototypes are directions too (Wang et al. 2018, cosine softmax),
@@ -36,11 +36,11 @@ OUTPUT_SHAPES = {"embedding": (BATCH, DIMENSIONS), "odds": (BATCH, 2)}
 MAX_APPEARANCES = 8
 # Appearances with a higher cosine are the same one.
 SAME_COSINE = 0.9
-_FIELDS_IN_FILE = {"novel_sharpness": "met_sharpness", "novel_unknown": "met_unknown"}
+FIELDS_IN_FILE = {"novel_sharpness": "met_sharpness", "novel_unknown": "met_unknown"}
 
 
 class Prototypes(
-    msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True, rename=_FIELDS_IN_FILE
+    msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True, rename=FIELDS_IN_FILE
 ):
     """What belongs to the network's weights: a direction for each label that was taught, and the
     constants that make a cosine a probability.
@@ -100,7 +100,7 @@ class Recognition:
 
     @property
     def known(self) -> bool:
-        """Whether the label is likelier than an unknown building and background together, as far as
+        """True if the label is likelier than an unknown building and background together, as far as
         the view alone goes.
         """
         return self.evidence > self.unknown + self.background
@@ -125,8 +125,7 @@ class ObjectRecognizer:
 
         passes = []
         for first in range(0, len(segments), BATCH):
-            end = first + BATCH
-            some = segments[first:end]
+            some = segments[first : first + BATCH]
             batch = np.zeros(INPUT_SHAPE, np.float32)
             for row, segment in enumerate(some):
                 batch[row] = crop(image, depth_m, segment, around, camera.fx_px)
@@ -148,11 +147,11 @@ class ObjectRecognizer:
 
     @property
     def labels(self) -> list[str]:
-        """What a segment may be recognized as: every label taught, then every one learned."""
+        """Every label that a segment may be recognized as: those taught, then those learned."""
         return [*self._prototypes.names, *dict.fromkeys(self._labels)]
 
     def is_taught(self, label: str) -> bool:
-        """Return whether the label was taught, not learned since."""
+        """Return true if the label was taught, not learned since."""
         return label in self._prototypes.names
 
     def recognize(
@@ -161,17 +160,23 @@ class ObjectRecognizer:
         excluded: Container[str] = (),
         log_prior: Floats | float = 0.0,
     ) -> Recognition:
-        """Return what appears so, which is none of the labels `excluded`, perhaps nothing known.
+        """Return the recognition of a segment with this `appearance`, as none of the labels
+        `excluded`.
 
         `log_prior`: how much likelier each of `labels` was before the view, as a logarithm.
         """
         labels = self.labels
         taught = len(self._prototypes.names)
+
+        # The cosine with a learned label is that with its most similar embedding.
+        novel = labels[taught:]
+        novel_cosines = np.full(len(novel), np.float32(-1.0))
+        rows = [novel.index(label) for label in self._labels]
+        np.maximum.at(novel_cosines, rows, self._embeddings @ appearance.embedding)
+
         is_excluded = np.array([label in excluded for label in labels])
         log_odds = _log_odds(
-            self._directions @ appearance.embedding,
-            self._novel_cosines(appearance, labels[taught:]),
-            self._prototypes,
+            self._directions @ appearance.embedding, novel_cosines, self._prototypes
         )
         possible: Floats = np.where(is_excluded, -np.inf, log_odds)
 
@@ -194,38 +199,18 @@ class ObjectRecognizer:
             size_m=size_m,
         )
 
-    def _novel_cosines(self, appearance: Appearance, novel: list[str]) -> Singles:
-        """The cosine with each of the labels `novel`: that of its most similar embedding."""
-        cosines = self._embeddings @ appearance.embedding
-        rows = [novel.index(label) for label in self._labels]
-
-        lowest = np.float32(-1.0)
-        highest = np.full(len(novel), lowest)
-        np.maximum.at(highest, rows, cosines)
-
-        return highest
-
     def learn(self, label: str, embedding: Singles) -> None:
         """Recognize from now on what is similar to `embedding` as `label`."""
         self._labels.append(label)
-
-        known = self._embeddings
-        added = embedding[None]
-        self._embeddings = np.concatenate([known, added])
+        self._embeddings = np.concatenate([self._embeddings, embedding[None]])
 
     def is_new_appearance(self, recognition: Recognition) -> bool:
-        """Return whether a learned building differs from every appearance of it that was learned,
+        """Return true if a learned building differs from every appearance of it that was learned,
         and has fewer than MAX_APPEARANCES.
         """
-        label = recognition.label
-        embeddings = [embedding for known, embedding in self.learned if known == label]
-        if not 0 < len(embeddings) < MAX_APPEARANCES:
-            return False
-
         embedding = recognition.appearance.embedding
-        cosines = [known @ embedding for known in embeddings]
-        highest = max(cosines)
-        return bool(highest < SAME_COSINE)
+        cosines = [known @ embedding for label, known in self.learned if label == recognition.label]
+        return 0 < len(cosines) < MAX_APPEARANCES and bool(max(cosines) < SAME_COSINE)
 
     @property
     def sizes_m(self) -> dict[str, tuple[float, float, float]]:
@@ -253,18 +238,13 @@ def load(path: Path = DEFAULT_PATH, processor: Processor = "cpu") -> ObjectRecog
             "train both again with cogmap train objects"
         ) from None
 
-    if not _is_complete(prototypes):
+    dimensions = {len(direction) for direction in prototypes.directions}
+    counts = {len(prototypes.names), len(prototypes.directions), len(prototypes.size_m)}
+    if dimensions != {DIMENSIONS} or len(counts) != 1:
         raise ConfigError(
             f"{beside} belongs to other weights: train both again with cogmap train objects"
         )
     return ObjectRecognizer(network, prototypes)
-
-
-def _is_complete(prototypes: Prototypes) -> bool:
-    """Whether each name has a direction of DIMENSIONS and a size."""
-    dimensions = {len(direction) for direction in prototypes.directions}
-    counts = {len(prototypes.names), len(prototypes.directions), len(prototypes.size_m)}
-    return dimensions == {DIMENSIONS} and len(counts) == 1
 
 
 def posteriors(
@@ -291,14 +271,13 @@ def _posteriors(possible: Floats, building: npt.ArrayLike) -> Floats:
     *leading, _ = possible.shape
     unknown = np.zeros((*leading, 1))
     log_weights = np.concatenate([possible, unknown], axis=-1)
-    weights = _scaled_weights(log_weights)
+    # Scaled so that the largest is 1.
+    weights = np.asarray(np.exp(log_weights - log_weights.max(axis=-1, keepdims=True)))
     total = weights.sum(axis=-1, keepdims=True)
 
-    probabilities = np.asarray(building, np.float64)
-    of_building = probabilities[..., None]
-    background = 1 - of_building
+    of_building = np.asarray(building, np.float64)[..., None]
     labels = of_building * weights / total
-    return np.concatenate([labels, background], axis=-1)
+    return np.concatenate([labels, 1 - of_building], axis=-1)
 
 
 def _log_odds(taught: Singles, novel: Singles, prototypes: Prototypes) -> Floats:
@@ -308,19 +287,7 @@ def _log_odds(taught: Singles, novel: Singles, prototypes: Prototypes) -> Floats
     return np.concatenate([taught_odds, novel_odds], axis=-1, dtype=np.float64)
 
 
-def _scaled_weights(log_weights: Floats) -> Floats:
-    """The exponentials, scaled so that the largest along the last axis is 1."""
-    highest = log_weights.max(axis=-1, keepdims=True)
-    below = log_weights - highest
-    return np.asarray(np.exp(below))
-
-
 def probability(log_odds: Singles, prototypes: Prototypes) -> Floats:
     """Return the calibrated probability of the network's log odds."""
-    precise = log_odds.astype(np.float64)
-    clipped = precise.clip(-50, 50)
-    calibrated = prototypes.evidence * clipped
-
-    odds_against = np.exp(-calibrated)
-    odds_sum = 1 + odds_against
-    return np.asarray(1 / odds_sum)
+    calibrated = prototypes.evidence * log_odds.astype(np.float64).clip(-50, 50)
+    return np.asarray(1 / (1 + np.exp(-calibrated)))

@@ -42,8 +42,8 @@ SAME_CENTRE = 0.04
 
 @dataclass(frozen=True, eq=False)
 class Segment:
-    """What is seen of one object: `mask` (h, w) of the whole view, and its bounding box `box_px`:
-    left, top, width, height.
+    """The visible part of one object: `mask` (h, w) of the whole view, and its bounding box
+    `box_px`: left, top, width, height.
     """
 
     mask: Booleans
@@ -53,7 +53,6 @@ class Segment:
     def of(cls, mask: Booleans) -> Segment:
         """Return the segment of `mask`, in which at least one pixel is set."""
         left, top, width, height = cv2.boundingRect(mask.astype(np.uint8))
-
         return cls(mask, (left, top, width, height))
 
     @property
@@ -110,18 +109,16 @@ def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Single
     colours[:] = colours / 64.0 - 2.0
 
     known = depth_m > 0
-    limited_m = np.clip(depth_m, 1.0, 100.0)
-    log_depth = np.log(limited_m)
-    values[3] = log_depth / 2.0 - 1.0
+    values[3] = np.log(np.clip(depth_m, 1.0, 100.0)) / 2.0 - 1.0
     values[4] = known
 
-    height_m = _height_m(depth_m, camera)
-    scaled_height = height_m / 5.0
-    values[5] = np.clip(scaled_height, -1.0, 3.0)
+    row = np.arange(HEIGHT_PX, dtype=np.float32) * camera.height_px / HEIGHT_PX
+    below = (row[:, None] - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
+    height_m = np.asarray(camera.mount_height_m - below * depth_m)
+    values[5] = np.clip(height_m / 5.0, -1.0, 3.0)
 
-    unknown = ~known
-    values[3][unknown] = 0.0
-    values[5][unknown] = 0.0
+    values[3][~known] = 0.0
+    values[5][~known] = 0.0
 
     down = np.linspace(-1, 1, HEIGHT_PX, dtype=np.float32)
     across = np.linspace(-1, 1, WIDTH_PX, dtype=np.float32)
@@ -130,29 +127,12 @@ def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Single
     return values
 
 
-def _height_m(depth_m: Singles, camera: Calibration) -> Singles:
-    """Height over the ground of what each pixel of (HEIGHT_PX, WIDTH_PX) shows."""
-    small_row = np.arange(HEIGHT_PX, dtype=np.float32)
-    enlarged_row = small_row * camera.height_px
-    row = enlarged_row / HEIGHT_PX
-
-    below_px = row[:, None] - np.float32(camera.cy_px)
-    down = below_px / np.float32(camera.fy_px)
-
-    below_camera_m = down * depth_m
-
-    height_m = camera.mount_height_m - below_camera_m
-    return np.asarray(height_m)
-
-
 def padded(values: Singles) -> Singles:
     """Return `values` (..., HEIGHT_PX, WIDTH_PX) with rows above and below, so that the network can
     halve them often enough.
     """
     leading = [(0, 0)] * (values.ndim - 2)
-    rows = (PADDING_PX, PADDING_PX)
-    columns = (0, 0)
-    return np.pad(values, [*leading, rows, columns], mode="edge")
+    return np.pad(values, [*leading, (PADDING_PX, PADDING_PX), (0, 0)], mode="edge")
 
 
 def divided(output: Singles, size: tuple[int, ...]) -> list[Segment]:
@@ -160,18 +140,35 @@ def divided(output: Singles, size: tuple[int, ...]) -> list[Segment]:
     float32 (4, HEIGHT_PX, WIDTH_PX): log odds of a building, probability of a centre, and its
     offset to the right and downwards, in units of OFFSET_PX.
     """
-    return _enlarged(_instances(output), output[0], size)
+    height, width = size
+    numbers = _instances(output)
+    enlarged_odds = cv2.resize(output[0], (width, height), interpolation=cv2.INTER_LINEAR)
+    building = enlarged_odds > 0
+
+    segments: list[Segment] = []
+    for number in range(numbers.max() + 1):
+        small = (numbers == number).astype(np.float32)
+        if np.count_nonzero(small) < MIN_PIXELS:
+            continue
+
+        share = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
+        mask = np.asarray((share > 0.5) & building)
+        if mask.any():
+            segments.append(Segment.of(mask))
+
+    return sorted(segments, key=lambda segment: segment.box_px[0] + segment.box_px[2] / 2)
 
 
 def _instances(output: Singles) -> npt.NDArray[np.intp]:
     """The number of the object at each pixel, -1 for none, by the network's output (4, h, w)."""
     log_odds, centre, right, down = output
     numbers = np.full(log_odds.shape, -1, np.intp)
-    min_odds = MIN_BUILDING / (1 - MIN_BUILDING)
-    building = log_odds > np.log(min_odds)
+    building = log_odds > np.log(MIN_BUILDING / (1 - MIN_BUILDING))
     rows, columns = np.nonzero(building)
 
-    centres = _centres(centre)
+    # Centres are the local maxima over MIN_CENTRE.
+    highest = cv2.dilate(centre, np.ones((PEAK_PX, PEAK_PX), np.uint8))
+    centres = np.argwhere((centre == highest) & (centre > MIN_CENTRE))
     if not len(centres) or not len(rows):
         return numbers
 
@@ -179,7 +176,9 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     pointed_column = columns + OFFSET_PX * right[building]
     pointed_at = np.stack([pointed_row, pointed_column], 1)
 
-    numbers[building] = _nearest(pointed_at, centres)
+    # The nearest centre: the squared distance, less what is the same for all centres.
+    compared_px2 = (centres**2).sum(1) - 2 * (pointed_at @ centres.T)
+    numbers[building] = compared_px2.argmin(1)
     if len(centres) == 1:
         return numbers
 
@@ -210,8 +209,8 @@ def _joined(numbers: npt.NDArray[np.intp], pointed_at: Floats) -> npt.NDArray[np
 def _borders(
     numbers: npt.NDArray[np.intp], pointed_at: Floats, count: int
 ) -> tuple[npt.NDArray[np.intp], Floats]:
-    """Where two of `count` objects meet: the lower number times `count` plus the higher (n,), and
-    the distance in pixels between what the pixels on both sides point to (n,).
+    """The borders between two of `count` objects: the lower number times `count` plus the higher
+    (n,), and the distance in pixels between the places that the pixels on both sides point to (n,).
     """
     pairs = []
     apart_px = []
@@ -230,50 +229,3 @@ def _borders(
         apart_px.append(np.hypot(*difference_px.T))
 
     return np.concatenate(pairs), np.concatenate(apart_px)
-
-
-def _nearest(points_px: Floats, centres_px: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
-    """The number of the centre (k, 2) nearest to each point (n, 2)."""
-    # The squared distance, less what is the same for all centres.
-    squared_px2 = (centres_px**2).sum(1)
-    compared_px2 = squared_px2 - 2 * (points_px @ centres_px.T)
-
-    nearest: npt.NDArray[np.intp] = compared_px2.argmin(1)
-    return nearest
-
-
-def _centres(probability: Singles) -> npt.NDArray[np.intp]:
-    """Row and column (k, 2) of the local maxima over MIN_CENTRE."""
-    window = np.ones((PEAK_PX, PEAK_PX), np.uint8)
-    highest = cv2.dilate(probability, window)
-    is_peak = probability == highest
-    is_likely = probability > MIN_CENTRE
-    return np.argwhere(is_peak & is_likely)
-
-
-def _enlarged(
-    numbers: npt.NDArray[np.intp], log_odds: Singles, size: tuple[int, ...]
-) -> list[Segment]:
-    """The segments at the size (h, w) of the view, from left to right."""
-    height, width = size
-    enlarged_odds = cv2.resize(log_odds, (width, height), interpolation=cv2.INTER_LINEAR)
-    building = enlarged_odds > 0
-
-    segments: list[Segment] = []
-    for number in range(numbers.max() + 1):
-        small = (numbers == number).astype(np.float32)
-        if np.count_nonzero(small) < MIN_PIXELS:
-            continue
-
-        share = cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR)
-        mask = np.asarray((share > 0.5) & building)
-        if mask.any():
-            segments.append(Segment.of(mask))
-
-    return sorted(segments, key=_middle_column)
-
-
-def _middle_column(segment: Segment) -> float:
-    left, _, width, _ = segment.box_px
-    half = width / 2
-    return left + half

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from cogmap.estimation.pose_graph import Constraints, PoseGraph
 from cogmap.geometry.se2 import integrate
-from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
 
 SIDE = 20
 LAP = 4 * SIDE

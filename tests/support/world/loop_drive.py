@@ -7,6 +7,7 @@ import math
 import msgspec
 import numpy as np
 
+from cogmap.runtime.run import LOCKSTEP, Run
 from cogmap.schemas.sensing import Percept, Percepts, PlaceMatch
 from cogmap.services.codelets.module import Config as WorkerConfig
 from tests.support.world.scenes import Desk, Rows, motion, percept, percepts, stamp_ns
@@ -65,12 +66,12 @@ class LoopDrive:
         self,
         worker: WorkerConfig = QUIET,
         workers: int = 1,
-        mode: str = "lockstep",
+        run: Run = LOCKSTEP,
         bias_rad: float = 0.0,
         **settings: object,
     ):
         names = [f"w{number}" for number in range(workers)]
-        self.desk = Desk(*names, mode=mode, codelets=worker, **settings)
+        self.desk = Desk(*names, run=run, codelets=worker, **settings)
         self.bias_rad = bias_rad
         self.poses = true_poses(3 * LAP)
         self.frame = 0

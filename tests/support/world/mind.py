@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from cogmap.runtime.run import LOCKSTEP, Run
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.cognition import Broadcast, Coalition, Competition, Trigger
@@ -38,7 +39,7 @@ LOOKS = ("bakery", "tower", "school")
 
 def config(episodic: EpisodicConfig = EPISODIC, **facts: Any) -> Config:
     """Settings with which each cycle stores and recalls."""
-    usual: dict[str, Any] = {"mode": "lockstep", "store_cycles": 1, "recall_cycles": 1}
+    usual: dict[str, Any] = {"store_cycles": 1, "recall_cycles": 1}
     return Config(episodic=episodic, **({"sparse": SPARSE} | usual | facts))
 
 
@@ -53,8 +54,8 @@ def seen(*looks: str, salience: float = 0.0) -> list[AnyNode]:
 class Mind:
     """Long-term memory, and what the others publish for it: a cycle a second."""
 
-    def __init__(self, settings: Config | None = None) -> None:
-        self.module = build(settings or config(), "memory")
+    def __init__(self, settings: Config | None = None, run: Run = LOCKSTEP) -> None:
+        self.module = build(settings or config(), "memory", run)
         self.published: list[Message] = []
         self.cycle = 0
         self._version = 0
@@ -130,9 +131,11 @@ def first_run(place_m: tuple[float, float] = (3.0, 4.0)) -> list[StoredRecord]:
     return list(mind.records().values())
 
 
-def second_run(records: Iterable[StoredRecord], settings: Config | None = None) -> Mind:
+def second_run(
+    records: Iterable[StoredRecord], settings: Config | None = None, run: Run = LOCKSTEP
+) -> Mind:
     """A run that begins with these, on the map of the first one."""
-    mind = Mind(settings)
+    mind = Mind(settings, run)
     mind.module.feed(Restored(records=list(records)))
     mind.commit(Map(id=ROOT_MAP, cell_m=1.0, remembered="remembered:1"))
     return mind

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Action, ActionName, Competition, Trigger
@@ -29,16 +30,15 @@ def scan_of(*obstacles: tuple[float, float], cycle: int = 1) -> RangeScan:
     )
 
 
-def module_ahead(mode: str = "real_time", length_m: float = 20.0) -> Module:
+def module_ahead(run: Run = REAL_TIME, length_m: float = 20.0) -> Module:
     """A module whose plan leads straight ahead."""
-    module = module_without_plan(mode)
+    module = module_without_plan(run)
     return joined(module, plan_along((0.0, 0.0), (length_m, 0.0)))
 
 
-def module_without_plan(mode: str = "real_time") -> Module:
+def module_without_plan(run: Run = REAL_TIME) -> Module:
     """A module whose graph has no plan."""
-    config = Config(mode=mode)  # type: ignore[arg-type]
-    return build(config, "motor")
+    return build(Config(), "motor", run)
 
 
 def pose_delta(cycle: int = 1, x_m: float = 0.0, phase: Phase = Phase.LOCALIZATION) -> Delta:

@@ -1,122 +1,66 @@
-"""Messages to feed the modules of the mind with, and a workspace with workers at hand."""
+"""A workspace with workers at hand, and our codelets run by hand."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import Any
 
 import msgspec
-import numpy as np
-import numpy.typing as npt
 
 from cogmap.bus.codec import decode, encode
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, ConfiguredCodelet
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP, Run
 from cogmap.schemas import topics
-from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
-from cogmap.schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
-from cogmap.schemas.nodes import ROOT_MAP, SELF_ID, Map, Node, Object, Self, object_id
+from cogmap.schemas.graph import Delta, Operation, Snapshot, SnapshotRequest
+from cogmap.schemas.nodes import Node, Self
 from cogmap.schemas.process import Clock, Presence
-from cogmap.schemas.sensing import Percept, Percepts, SelfMotion
+from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.module import Config as WorkerConfig
 from cogmap.services.codelets.module import build as build_worker
 from cogmap.services.codelets.table import CODELETS
 from cogmap.services.workspace.module import Config, build
+from cogmap.testing import (
+    PERIOD_NS,
+    Rows,
+    agent,
+    graph_of,
+    landmark,
+    percept,
+    percepts,
+    run_codelet,
+    stamp_ns,
+    task,
+)
+from cogmap.testing import self_motion as motion
+from cogmap.testing.builders import STRAIGHT
 
-PERIOD_NS = 200_000_000
-Rows = Sequence[Sequence[float]]
-STRAIGHT: Rows = ((2.0, 0.0, 0.2, 0.1, 0.01),)
-
-
-def stamp_ns(frame: int) -> int:
-    """When a view was sensed; the first one is number 0."""
-    return (frame + 1) * PERIOD_NS
-
-
-def motion(frame: int, rows: Rows = STRAIGHT) -> SelfMotion:
-    """The self-motion from the view before to view `frame`."""
-    motions = np.array(rows, np.float64).reshape(-1, 5)
-    return SelfMotion(
-        stamp_ns=stamp_ns(frame),
-        frame=frame,
-        since_ns=stamp_ns(frame - 1),
-        motions=Array.of(motions),
-    )
-
-
-def percept(
-    label: str = "house", bearing_rad: float = 0.0, range_m: float = 10.0, **facts: Any
-) -> Percept:
-    """One building, seen well."""
-    usual: dict[str, Any] = {
-        "activation": 0.9,
-        "evidence": facts.get("activation", 0.9),
-        "bearing_sd_rad": 0.02,
-        "range_sd_m": 0.3,
-        "width_m": 8.0,
-        "height_m": 6.0,
-        "whole": True,
-        "box_px": (0, 0, 10, 10),
-    }
-    return Percept(label=label, bearing_rad=bearing_rad, range_m=range_m, **(usual | facts))
-
-
-def percepts(frame: int, *objects: Percept, road_m: Rows = ()) -> Percepts:
-    """What was recognised in view `frame`."""
-    points_m = np.array(road_m, np.float32).reshape(-1, 2)
-    return Percepts(
-        stamp_ns=stamp_ns(frame),
-        frame=frame,
-        objects=list(objects),
-        road_m=Array.of(points_m),
-    )
-
-
-def agent(samples: npt.ArrayLike | None = None, **facts: Any) -> Self:
-    """The self node, fully active, at the origin unless `facts` have another pose."""
-    values = np.zeros((200, 3)) if samples is None else samples
-    matrix = Matrix.of(values)
-    return Self(id=SELF_ID, activation=1.0, base_level=1.0, samples=matrix, **facts)
-
-
-def landmark(
-    label: str = "house", samples_m: npt.ArrayLike = ((10.0, 0.0),), **facts: Any
-) -> Object:
-    """An object with those samples of its position, fully active."""
-    values = np.asarray(samples_m, np.float64)
-    mean_m = values.mean(axis=0)
-    offsets_m = Matrix.of(values - mean_m, "<f2")
-    usual = {"activation": 1.0, "x_m": float(mean_m[0]), "y_m": float(mean_m[1])}
-    return Object(id=object_id(label), label=label, offsets_m=offsets_m, **(usual | facts))
+__all__ = [
+    "PERIOD_NS",
+    "Desk",
+    "Rows",
+    "agent",
+    "answer",
+    "configured",
+    "graph_of",
+    "landmark",
+    "motion",
+    "percept",
+    "percepts",
+    "received",
+    "run",
+    "stamp_ns",
+    "task",
+    "thing",
+]
 
 
 def thing(name: str) -> Node:
     """A node of a kind that the table of kinds does not have."""
     return Node(id=name, kind="thing", activation=1.0)
-
-
-def graph_of(*operations: Operation, cell_m: float = 1.0) -> Graph:
-    """A graph at version 1, in cycle 1, of a root map and what `operations` make."""
-    graph = Graph()
-    root = Map(id=ROOT_MAP, cell_m=cell_m)
-    delta = Delta(version=1, cycle=1, phase=Phase.PERCEPTS, operations=[root, *operations])
-    assert graph.apply(delta)
-    return graph
-
-
-def task(codelet: str, identifier: str = "", **facts: Any) -> Task:
-    """A task of cycle 1 on version 1."""
-    usual = {
-        "cycle": 1,
-        "version": 1,
-        "motions": Array.of(np.zeros((0, 5))),
-        "road_m": Array.of(np.zeros((0, 2), np.float32)),
-    }
-    task_id = identifier or f"1/{codelet}"
-    return Task(task_id=task_id, codelet=codelet, **(usual | facts))
 
 
 def configured(config: WorkerConfig | None = None) -> list[ConfiguredCodelet]:
@@ -133,7 +77,7 @@ def _settings(codelet: Codelet, settings: msgspec.Struct) -> msgspec.Struct:
 def run(asked: Task, graph: Graph, config: msgspec.Struct) -> Answer:
     """What the codelet of `asked` answers."""
     (codelet,) = (codelet for codelet in CODELETS if codelet.name == asked.codelet)
-    return codelet.run(asked, graph, _settings(codelet, config))
+    return run_codelet(codelet, asked, graph, _settings(codelet, config))
 
 
 def answer(asked: Task, operations: Iterable[Operation] = (), failure: str = "") -> Proposal:
@@ -161,14 +105,13 @@ class Desk:
     def __init__(
         self,
         *workers: str,
-        mode: str = "lockstep",
+        run: Run = LOCKSTEP,
         codelets: WorkerConfig | None = None,
         **settings: Any,
     ) -> None:
         self._configured = configured(codelets)
-        facts = {"awaits_scan": False, "awaits_competition": False} | settings
-        config = Config(mode=mode, **facts)  # type: ignore[arg-type]
-        self.module: Module = build(config, "workspace", self._configured)
+        config = Config(**settings)
+        self.module: Module = build(config, "workspace", self._configured, run)
         self.withheld: list[Assignment] = []
         self.withhold = ""
         self.busy: list[str] = []

@@ -6,8 +6,9 @@ import math
 
 import numpy as np
 
+from benchmarks.harness import CycleMeter, Mark
 from benchmarks.lifelong.courier import LEG_NS, STOPS, Courier
-from benchmarks.lifelong.measure import SPAN, Mark, Meter, drive
+from benchmarks.lifelong.measure import SPAN, drive
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
@@ -73,15 +74,15 @@ def test_a_place_that_is_not_reached_in_time_is_given_up() -> None:
     assert second.id != first.id
 
 
-def test_costs_are_those_of_the_last_thousand_cycles() -> None:
-    meter = Meter()
+def test_costs_are_those_of_the_cycles_between_two() -> None:
+    meter = CycleMeter()
     cheap = [Mark(float(number), 10 * number) for number in range(SPAN + 1)]
     last = cheap[-1]
-    dear = [Mark(last.cpu_s + 3 * n, last.log_bytes + 40 * n) for n in range(1, SPAN + 1)]
+    dear = [Mark(last.cpu_s + 3 * n, last.message_bytes + 40 * n) for n in range(1, SPAN + 1)]
     meter.marks = [*cheap, *dear]
 
-    assert meter.spent(SPAN) == (1.0, 10.0)
-    assert meter.spent(2 * SPAN) == (3.0, 40.0)
+    assert meter.spent(0, SPAN) == (1.0, 10.0)
+    assert meter.spent(SPAN, 2 * SPAN) == (3.0, 40.0)
 
 
 def test_a_short_drive_is_measured() -> None:

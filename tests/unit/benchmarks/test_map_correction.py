@@ -15,13 +15,13 @@ from benchmarks.map_correction.files import read_graph
 from benchmarks.map_correction.measure import measure
 from benchmarks.trajectory import trajectory_error_m
 from cogmap.errors import UsageError
-from cogmap.geometry.se2 import compose, integrate, relative
-from cogmap.services.codelets.correction.pose_graph import cost
-from cogmap.services.codelets.correction.reverse_replay import (
+from cogmap.estimation.pose_graph import cost
+from cogmap.estimation.reverse_replay import (
     close_loops,
     displacements,
     position_cost,
 )
+from cogmap.geometry.se2 import compose, integrate, relative
 from tests.support.world.laps import laps
 
 SQUARE = """VERTEX_SE2 0 0 0 0

@@ -6,7 +6,7 @@ import numpy as np
 
 from benchmarks.map_structure.measure import sub_maps_of
 from benchmarks.map_structure.towns import FUNCTIONS, MIN_OBJECTS, UNKNOWN, town
-from cogmap.services.codelets.structure.config import Config
+from cogmap.services.codelets.sub_maps.config import Config
 
 
 def test_a_seed_always_gives_the_same_town() -> None:

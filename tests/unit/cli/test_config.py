@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from cogmap.cli.config import commented_toml, file_schema, print_config
-from cogmap.cli.launch.plan import Choices, awaited, effective
+from cogmap.cli.launch.plan import Choices, effective
 from cogmap.services import registry
 
 TICKS_PER_CYCLE = 40
@@ -40,7 +40,6 @@ LIDA = {
     "workspace.learning": "linear",
     "workspace.recognition_threshold": "0.7 of total activation",
     "epam.percept_threshold": "0.7 of total activation",
-    "epam.base_level": "learned",
     "epam.priming.share": 0.9,
     "epam.priming.half_life_s": 0.5 / 0.05 / TICKS_PER_CYCLE / CYCLES_PER_S,
     "epam.priming.feeling_threshold": 0.7,
@@ -99,7 +98,7 @@ def description(path: str) -> str:
 
 def sections(**given: dict[str, Any]) -> dict[str, dict[str, Any]]:
     choices = Choices(seed=7)
-    return effective(given, choices, awaited(choices, observer=False))
+    return effective(given, choices, observer=False)
 
 
 @pytest.mark.parametrize("sim", [{}, {"trajectory": TRAJECTORY}], ids=["town", "trajectory"])

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cogmap.cli.launch.plan import Choices, awaited, effective
+from cogmap.cli.launch.plan import Choices, effective
 from cogmap.cli.run.checks import check_inputs
 from cogmap.errors import CogmapError, ConfigError, StorageError
 from cogmap.runtime.state.database import Database
@@ -14,7 +14,7 @@ from tests.support.world.schemes import FOLLOW, HEADER, written
 
 
 def _check(choices: Choices, **sections: dict[str, object]) -> None:
-    check_inputs(effective(sections, choices, awaited(choices, observer=True)), choices)
+    check_inputs(effective(sections, choices, observer=True), choices)
 
 
 def test_a_drive_that_can_begin_passes_and_no_database_is_made(tmp_path: Path) -> None:

@@ -144,7 +144,7 @@ def test_a_view_is_ready_once_the_competition_that_primes_it_has_ended() -> None
 
 
 def test_the_graph_is_published_after_so_many_broadcasts() -> None:
-    primer = Primer(msgspec.structs.replace(CONFIG, kept_broadcasts=2))
+    primer = Primer(CONFIG, broadcasts_per_publication=2)
     published = []
     for second in range(1, 8):
         published.append(primer.begin(second * SECOND_NS) is not None)

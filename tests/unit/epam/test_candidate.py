@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from cogmap.services.epam.layout.walls import walls
 from cogmap.services.epam.recognition.candidate import Candidate, joined, outline_px
 from cogmap.services.epam.recognition.objects import Appearance, Recognition
 from cogmap.services.epam.recognition.segments import Segment
+from cogmap.services.epam.recognition.walls import walls
 
 SIZE = (240, 320)
 

@@ -15,7 +15,7 @@ from cogmap.services.epam.config import Priming
 from tests.support.world.scenes import percept
 
 SECOND_NS = 1_000_000_000
-CONFIG = Priming(kept_broadcasts=1)
+CONFIG = Priming()
 
 
 def _object(label: str, function: str = "") -> Object:
@@ -26,7 +26,7 @@ class Story:
     """A PAM that learns from a broadcast a second."""
 
     def __init__(self) -> None:
-        self.primer = Primer(CONFIG)
+        self.primer = Primer(CONFIG, broadcasts_per_publication=1)
         self.published: list[Associations] = []
         self._second = 0
 

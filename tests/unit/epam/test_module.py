@@ -14,6 +14,7 @@ import pytest
 from cogmap.bus import codec
 from cogmap.errors import ConfigError, MessageError
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP
 from cogmap.runtime.state.journal import Journal
 from cogmap.schemas import topics
 from cogmap.schemas.array import Array
@@ -82,18 +83,6 @@ def test_a_segment_under_the_threshold_is_no_percept(views: list[View]) -> None:
     )
 
     assert some > fewer > none == 0
-
-
-def test_base_level_activation_adds_to_the_current_one(views: list[View]) -> None:
-    bare, raised = (
-        [
-            percept.activation
-            for percept in _percepts(build(Config(base_level=level), "epam"), views[1]).objects
-        ]
-        for level in (0.0, 0.3)
-    )
-
-    assert raised == pytest.approx([min(1.0, activation + 0.3) for activation in bare])
 
 
 def test_a_percept_is_outlined_boxed_and_measured(views: list[View]) -> None:
@@ -328,7 +317,7 @@ def _competition(stamp_ns: int) -> Competition:
 
 
 def test_in_lockstep_a_view_waits_for_the_competition_that_primes_it(views: list[View]) -> None:
-    module = build(Config(mode="lockstep"), "epam")
+    module = build(Config(), "epam", LOCKSTEP)
     for view in views[:2]:
         assert of_type(Percepts, module.feed(view))
 
@@ -338,7 +327,7 @@ def test_in_lockstep_a_view_waits_for_the_competition_that_primes_it(views: list
 
 
 def test_in_lockstep_a_view_that_comes_again_waits_for_nothing(views: list[View]) -> None:
-    module = build(Config(mode="lockstep"), "epam")
+    module = build(Config(), "epam", LOCKSTEP)
     for view in views[:3]:
         module.feed(view)
 

@@ -15,7 +15,7 @@ from cogmap.errors import MessageError
 from cogmap.schemas.array import Array
 from cogmap.schemas.sensing import PlaceMatch, RememberedView
 from cogmap.services.epam.places.descriptor import DESCRIPTOR_BYTES
-from cogmap.services.epam.places.recognizer import PlaceConfig, PlaceRecognizer
+from cogmap.services.epam.places.recognizer import PlaceRecognizer
 
 Image = npt.NDArray[np.uint8]
 HEIGHT = 240
@@ -216,7 +216,7 @@ def test_at_rest_after_a_restart_no_view_is_remembered_again() -> None:
 def test_beyond_the_capacity_the_oldest_views_are_forgotten() -> None:
     first = Route(1)
     third = Route(3)
-    recognizer = PlaceRecognizer(PlaceConfig(capacity=150))
+    recognizer = PlaceRecognizer(capacity=150)
     _drive(recognizer, [*_lap(first), *_lap(Route(2)), *_lap(third)])
 
     kept = [view.frame for view in recognizer.all]

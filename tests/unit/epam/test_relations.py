@@ -10,11 +10,11 @@ from cogmap.schemas.nodes import ROOT_MAP, Object, Side, category_id, map_id, ob
 from cogmap.schemas.sensing import Associations
 from cogmap.services.epam.association.memory import BEHIND, Primer, nodes_of
 from cogmap.services.epam.association.prior import Prior
-from cogmap.services.epam.association.relations import Seen, beside, related
+from cogmap.services.epam.association.relations import NamedObject, beside, related
 from cogmap.services.epam.config import Priming
 
 SECOND_NS = 1_000_000_000
-CONFIG = Priming(kept_broadcasts=1)
+CONFIG = Priming()
 LEFT_OF_BAKERY = relation_id(Side.LEFT_OF, "bakery")
 RIGHT_OF_BAKERY = relation_id(Side.RIGHT_OF, "bakery")
 
@@ -46,7 +46,7 @@ def _broadcast(second: int, *looks: str, maps: tuple[str, ...] = ()) -> Broadcas
 
 def _taught(*rounds: tuple[str, ...]) -> tuple[Primer, Associations]:
     """A PAM that has learned from a broadcast a second of what stood from left to right."""
-    primer = Primer(CONFIG)
+    primer = Primer(CONFIG, broadcasts_per_publication=1)
     published = None
     for second, looks in enumerate(rounds, start=1):
         primer.on_broadcast(_broadcast(second, *looks))
@@ -96,7 +96,7 @@ def test_a_relation_is_not_unlearned_while_it_is_out_of_view() -> None:
 
 def test_a_relation_is_a_node_that_is_published_and_restored_with_its_links() -> None:
     primer, published = _taught(*[("school", "bakery")] * 10)
-    again = Primer(CONFIG)
+    again = Primer(CONFIG, broadcasts_per_publication=1)
     again.restore(msgspec.msgpack.decode(msgspec.msgpack.encode(published), type=Associations))
 
     assert LEFT_OF_BAKERY in published.names
@@ -113,9 +113,9 @@ def test_a_broadcast_alone_primes_nothing_over_a_relation() -> None:
 
 def test_something_seen_stands_beside_the_nearest_that_are_named() -> None:
     named = {
-        "tower": Seen(column=10.0, evidence=0.9),
-        "school": Seen(column=80.0, evidence=0.8),
-        "bakery": Seen(column=200.0, evidence=0.7),
+        "tower": NamedObject(column=10.0, evidence=0.9),
+        "school": NamedObject(column=80.0, evidence=0.8),
+        "bakery": NamedObject(column=200.0, evidence=0.7),
     }
 
     assert beside(120.0, named) == {
@@ -136,7 +136,7 @@ def test_the_less_evidence_there_is_of_a_building_the_less_is_expected_beside_it
 
 
 def test_a_sub_map_that_is_conscious_is_a_node_which_its_buildings_are_linked_with() -> None:
-    primer = Primer(CONFIG)
+    primer = Primer(CONFIG, broadcasts_per_publication=1)
     district = map_id(3)
     told = _broadcast(1, "bakery", maps=(ROOT_MAP, district))
 

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from cogmap.services.epam.layout.walls import Walls, walls
 from cogmap.services.epam.recognition.segments import (
     HEIGHT_PX,
     OFFSET_PX,
@@ -17,6 +16,7 @@ from cogmap.services.epam.recognition.segments import (
     load,
     network_input,
 )
+from cogmap.services.epam.recognition.walls import Walls, walls
 from tests.support.world.blocks import CAMERA
 
 SIZE = (240, 320)

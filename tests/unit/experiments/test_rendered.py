@@ -67,7 +67,8 @@ def test_with_cameras_landmarks_become_buildings_of_the_catalogue() -> None:
     assert names[:2] == ["bakery", "library"]
     assert seen_along["sensing"] == "cameras"
     assert "percepts" not in simulated
-    assert simulated["awaits"] == {**told["sim"]["awaits"], "sensory": 1, "epam": 1}
+    members = {**told["run"]["participants"], "sensory": 1, "epam": 1}
+    assert with_cameras(told)["run"]["participants"] == members
     assert "sensing" not in told["sim"]["trajectory"]
 
 

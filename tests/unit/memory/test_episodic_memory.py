@@ -8,6 +8,7 @@ import msgspec
 import pytest
 
 from cogmap.bus.codec import encode
+from cogmap.runtime.run import REAL_TIME
 from cogmap.runtime.state.store import Store
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.memory import (
@@ -229,7 +230,7 @@ def test_the_same_messages_lead_to_the_same_bytes() -> None:
 
 
 def test_in_real_time_an_episode_is_all_that_is_offered() -> None:
-    mind = second_run(first_run(), config(mode="real_time"))
+    mind = second_run(first_run(), run=REAL_TIME)
     mind.live((4.0, 4.5), *seen(*LOOKS), cycles=6)
 
     assert len(of_type(Offer, mind.published)) == 1

@@ -6,6 +6,7 @@ import pytest
 
 from cogmap.geometry.se2 import transform_to
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP, REAL_TIME, Run
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
@@ -32,7 +33,7 @@ from cogmap.services.memory.module import Config, build
 from tests.support.messages import of_type
 from tests.support.world.scenes import agent
 
-CONFIG = Config(mode="lockstep", store_cycles=2, recall_cycles=1)
+CONFIG = Config(store_cycles=2, recall_cycles=1)
 LOOKS = ("bakery", "tower", "house", "school")
 POSE = np.array([30.0, -10.0, 0.7])
 AT_M = np.random.default_rng(7).uniform(-60, 60, (12, 2))
@@ -82,8 +83,10 @@ def district(*labels: str) -> list[Operation]:
 class Mind:
     """Long-term memory, and what the others publish for it."""
 
-    def __init__(self, *operations: Operation, config: Config = CONFIG) -> None:
-        self.module: Module = build(config, "memory")
+    def __init__(
+        self, *operations: Operation, config: Config = CONFIG, run: Run = LOCKSTEP
+    ) -> None:
+        self.module: Module = build(config, "memory", run)
         self._version = 0
         self.commit(1, Map(id=ROOT_MAP, cell_m=1.0), agent(), *operations)
 
@@ -312,7 +315,7 @@ def test_a_repeated_scan_releases_the_offer_that_waits_for_a_lost_competition() 
 
 
 def test_in_real_time_nothing_is_offered_where_nothing_is_recalled() -> None:
-    mind = Mind(config=Config())
+    mind = Mind(run=REAL_TIME)
 
     assert mind.live(10) == []
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas.cognition import ActionName, MotorProgram, Trigger
 from cogmap.schemas.sensing import MotorCommand, SpeedLimit
 from tests.support.world.motor import (
@@ -21,7 +22,7 @@ from tests.support.world.motor import (
 
 
 def test_in_lockstep_a_plan_that_comes_after_the_pose_waits_for_the_next_one() -> None:
-    module = module_ahead("lockstep")
+    module = module_ahead(LOCKSTEP)
     for message in (action_of(0), motion_of(), pose_delta(1)):
         module.feed(message)
     module.feed(plan_delta(2, (0.0, 0.0), (0.0, 20.0)))
@@ -38,7 +39,7 @@ def test_in_lockstep_the_command_waits_for_the_senses_and_the_cycle_before() -> 
         "competition": competition_of(1),
     }
     for last, last_message in inputs.items():
-        module = module_ahead("lockstep")
+        module = module_ahead(LOCKSTEP)
         for name, message in inputs.items():
             if name != last:
                 assert module.feed(message) == []
@@ -46,14 +47,14 @@ def test_in_lockstep_the_command_waits_for_the_senses_and_the_cycle_before() -> 
 
 
 def test_in_lockstep_the_command_waits_for_the_action_of_a_broadcast() -> None:
-    module = module_ahead("lockstep")
+    module = module_ahead(LOCKSTEP)
     module.feed(motion_of(2))
     module.feed(scan_of(cycle=2))
     module.feed(competition_of(1, Trigger.NO_BROADCAST))
 
     assert module.feed(pose_delta(2)) == []
 
-    program, command = module.feed(action_of(1))
+    program, _, command = module.feed(action_of(1))
 
     assert isinstance(program, MotorProgram)
     assert isinstance(command, MotorCommand)
@@ -61,7 +62,7 @@ def test_in_lockstep_the_command_waits_for_the_action_of_a_broadcast() -> None:
 
 
 def test_in_lockstep_an_action_that_overtakes_its_pose_counts_after_the_command() -> None:
-    module = module_ahead("lockstep")
+    module = module_ahead(LOCKSTEP)
     for message in (
         action_of(0),
         motion_of(),
@@ -74,7 +75,7 @@ def test_in_lockstep_an_action_that_overtakes_its_pose_counts_after_the_command(
     module.feed(competition_of(1))
 
     assert module.feed(action_of(2, ActionName.HALT)) == []
-    command, program = module.feed(pose_delta(2, x_m=1.0))
+    _, command, program = module.feed(pose_delta(2, x_m=1.0))
 
     assert isinstance(command, MotorCommand)
     assert command.left_wheel_rad_s > 0
@@ -83,7 +84,7 @@ def test_in_lockstep_an_action_that_overtakes_its_pose_counts_after_the_command(
 
 
 def test_in_lockstep_a_later_competition_does_not_end_the_wait_for_an_action() -> None:
-    module = module_ahead("lockstep")
+    module = module_ahead(LOCKSTEP)
     module.feed(motion_of(2))
     module.feed(scan_of(cycle=2))
     module.feed(competition_of(1, Trigger.NO_BROADCAST))
@@ -94,7 +95,7 @@ def test_in_lockstep_a_later_competition_does_not_end_the_wait_for_an_action() -
 
 
 def test_in_lockstep_that_no_action_was_chosen_is_waited_for_too() -> None:
-    module = module_ahead("lockstep")
+    module = module_ahead(LOCKSTEP)
     module.feed(motion_of(2))
     module.feed(scan_of(cycle=2))
     module.feed(competition_of(1, Trigger.NO_BROADCAST))
@@ -118,7 +119,7 @@ def test_in_lockstep_an_action_that_was_lost_is_waited_for_once() -> None:
 
 
 def test_in_lockstep_the_first_cycle_waits_for_no_competition() -> None:
-    module = module_ahead("lockstep")
+    module = module_ahead(LOCKSTEP)
     module.feed(motion_of())
     module.feed(scan_of())
 
@@ -127,7 +128,7 @@ def test_in_lockstep_the_first_cycle_waits_for_no_competition() -> None:
 
 def _answered_lockstep() -> tuple[Module, MotorCommand]:
     """A module in lockstep that has answered the pose of cycle 1, and its command."""
-    module = module_ahead("lockstep")
+    module = module_ahead(LOCKSTEP)
     for message in (action_of(0), motion_of(), scan_of()):
         module.feed(message)
 
@@ -160,7 +161,7 @@ def test_in_lockstep_a_repeated_scan_ends_the_wait_for_a_lost_competition() -> N
 
 
 def test_in_lockstep_a_restarted_module_without_a_pose_halts_for_a_frame() -> None:
-    module = module_ahead("lockstep")
+    module = module_ahead(LOCKSTEP)
     module.feed(motion_of(6))
     assert module.feed(scan_of(cycle=6)) == []
 
@@ -171,7 +172,7 @@ def test_in_lockstep_a_restarted_module_without_a_pose_halts_for_a_frame() -> No
 
 
 def test_in_lockstep_a_restarted_module_waits_for_no_past_competition() -> None:
-    module = module_ahead("lockstep")
+    module = module_ahead(LOCKSTEP)
     assert module.restore is not None
 
     (program,) = module_ahead().feed(action_of(4))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from cogmap.errors import MessageError
+from cogmap.runtime.run import LOCKSTEP, REAL_TIME, Run
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.cognition import ActionName, MotorProgram
 from cogmap.schemas.graph import Phase
@@ -119,9 +120,9 @@ def test_where_the_plan_ends_at_the_agents_own_place_there_is_no_route() -> None
     assert command_after(module, pose_delta()).halted_by is SpeedLimit.NO_ROUTE
 
 
-@pytest.mark.parametrize("mode", ["lockstep", "real_time"])
-def test_a_plan_is_driven_from_the_next_pose_on(mode: str) -> None:
-    module = module_ahead(mode)
+@pytest.mark.parametrize("run", [LOCKSTEP, REAL_TIME])
+def test_a_plan_is_driven_from_the_next_pose_on(run: Run) -> None:
+    module = module_ahead(run)
     for message in (action_of(0), motion_of(), scan_of()):
         module.feed(message)
     ahead = command_after(module, pose_delta(1))
@@ -162,7 +163,7 @@ def test_a_pose_that_is_committed_late_leads_to_a_command_too() -> None:
 
 
 def test_each_pose_leads_to_one_command() -> None:
-    module = module_ahead("lockstep")
+    module = module_ahead(LOCKSTEP)
     answers = [
         module.feed(message)
         for message in (

@@ -9,6 +9,7 @@ import pytest
 
 from cogmap.errors import ConfigError
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP, REAL_TIME, Run
 from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Action, Behaviour, Behaviours, Broadcast, Coalition, Rejection
 from cogmap.schemas.feelings import Feeling
@@ -35,8 +36,8 @@ AT_GOAL = Plan(id=PLAN_ID, state=PlanState.AT_GOAL, base_level=1.0)
 class Memory:
     """Procedural memory, and a graph that it follows."""
 
-    def __init__(self, mode: str = "lockstep", **settings: Any) -> None:
-        self.module: Module = build(Config(mode=mode, **settings), "procedural")  # type: ignore[arg-type]
+    def __init__(self, run: Run = LOCKSTEP, **settings: Any) -> None:
+        self.module: Module = build(Config(**settings), "procedural", run)
         self._version = 0
 
     def commit(self, cycle: int, phase: Phase, *operations: Operation) -> list[Message]:
@@ -69,9 +70,9 @@ class Memory:
         )
 
 
-def _memory(mode: str = "lockstep", plan: Plan = READY) -> Memory:
+def _memory(run: Run = LOCKSTEP, plan: Plan = READY) -> Memory:
     """One whose graph has a plan before cycle 1."""
-    memory = Memory(mode)
+    memory = Memory(run)
     memory.commit(0, Phase.END, plan)
     return memory
 
@@ -86,9 +87,9 @@ def _cycles(published: list[Message]) -> list[int]:
     return [each.cycle for each in published if isinstance(each, Behaviours)]
 
 
-@pytest.mark.parametrize("mode", ["lockstep", "real_time"])
-def test_a_plan_with_a_route_calls_for_following_it(mode: str) -> None:
-    memory = _memory(mode)
+@pytest.mark.parametrize("run", [LOCKSTEP, REAL_TIME])
+def test_a_plan_with_a_route_calls_for_following_it(run: Run) -> None:
+    memory = _memory(run)
     memory.pose(1)
 
     found = _by_scheme(memory.broadcast(1))
@@ -151,7 +152,7 @@ def test_a_plan_that_is_broadcast_goes_before_that_of_the_graph() -> None:
 
 def test_a_scheme_may_depend_on_what_is_felt_about_the_broadcast(tmp_path: Path) -> None:
     text = FOLLOW.replace('"plan", state = "ready"', '"self", feeling = "danger"')
-    memory = Memory("real_time", schemes=str(written(tmp_path, HEADER + text)))
+    memory = Memory(REAL_TIME, schemes=str(written(tmp_path, HEADER + text)))
 
     fearful = _by_scheme(memory.broadcast(1, feeling=Feeling.DANGER))
     calm = _by_scheme(memory.broadcast(2))
@@ -213,7 +214,7 @@ def test_in_lockstep_an_action_that_was_lost_is_given_up() -> None:
 
 
 def test_in_real_time_nothing_is_waited_for() -> None:
-    memory = _memory("real_time")
+    memory = _memory(REAL_TIME)
 
     assert _cycles(memory.broadcast(1)) == [1]
     assert _cycles(memory.broadcast(2)) == [2]
@@ -232,11 +233,11 @@ def test_an_agent_that_moves_as_expected_makes_the_scheme_more_reliable() -> Non
 
 
 def test_a_restarted_module_keeps_what_it_learned_and_answers_nothing_twice() -> None:
-    before = _memory("real_time")
+    before = _memory(REAL_TIME)
     before.broadcast(1)
     before.action(1, "follow_route")
     past = before.broadcast(2)
-    after = _memory("real_time")
+    after = _memory(REAL_TIME)
     assert after.module.restore is not None
     after.module.restore(past)
 
@@ -259,7 +260,7 @@ def test_a_kind_that_the_graph_does_not_find_by_kind_is_refused() -> None:
 
 
 def test_guidance_that_was_learned_is_journaled_and_known_after_a_restart() -> None:
-    memory = _memory("real_time")
+    memory = _memory(REAL_TIME)
     published: list[Message] = []
     memory.module.feed(selected(1))
     for cycle in range(1, 60):
@@ -271,7 +272,7 @@ def test_guidance_that_was_learned_is_journaled_and_known_after_a_restart() -> N
     learned = [
         scheme for each in published if isinstance(each, Behaviours) for scheme in each.learned
     ]
-    after = _memory("real_time")
+    after = _memory(REAL_TIME)
     assert after.module.restore is not None
     assert after.module.compact is not None
     after.module.restore(published)

@@ -11,6 +11,7 @@ import pytest
 from cogmap.bus.codec import encode
 from cogmap.errors import ConfigError
 from cogmap.robot import BODY_RADIUS_M, calibration
+from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import (
     MotorCommand,
@@ -265,12 +266,12 @@ def test_a_barrier_closes_a_street_until_it_is_opened() -> None:
 
 
 def _config(**changes) -> Config:
-    return Config(mode="lockstep", town="blocks", sensing="percepts", duration_s=20.0, **changes)
+    return Config(town="blocks", sensing="percepts", duration_s=20.0, **changes)
 
 
 def _drive(config: Config) -> list[Message]:
     """All that is published on a drive that turns away from what is near."""
-    module = build(config)
+    module = build(config, run=LOCKSTEP)
     assert module.start is not None
     messages = module.stamp(module.start())
     published = list(messages)
@@ -315,7 +316,7 @@ def test_self_motion_without_noise_leads_to_the_true_pose() -> None:
 
 def test_a_simulation_that_was_killed_continues_where_the_robot_was() -> None:
     truths = of_type(TruePose, _drive(_config()))[:40]
-    module = build(_config())
+    module = build(_config(), run=LOCKSTEP)
     assert module.restore is not None
     assert module.start is not None
     module.restore(truths)
@@ -350,7 +351,7 @@ def test_a_closure_of_a_street_that_is_not_there_is_refused() -> None:
     closure = Closure(street="Nowhere 1", from_s=0.0)
 
     with pytest.raises(ConfigError, match=r"'Nowhere 1'.*name one of"):
-        build(_config(closures=[closure]))
+        build(_config(closures=[closure]), run=LOCKSTEP)
 
 
 @pytest.mark.parametrize("town", ["village", "osm:", ""])
@@ -361,4 +362,4 @@ def test_a_town_that_there_is_none_of_is_refused(town: str) -> None:
 
 def test_percepts_of_a_town_in_real_time_are_refused() -> None:
     with pytest.raises(ConfigError, match="lockstep"):
-        build(Config(mode="real_time", sensing="percepts"))
+        build(Config(sensing="percepts"))

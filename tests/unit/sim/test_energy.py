@@ -9,6 +9,7 @@ import pytest
 
 from cogmap.bus.codec import decode, encode
 from cogmap.errors import ConfigError
+from cogmap.runtime.run import LOCKSTEP, Run
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import (
@@ -29,21 +30,19 @@ from tests.support.messages import of_type
 HERE = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
 BATTERY = Battery(capacity_s=100.0, cost_per_m=0.01, charge_s=10.0, charge_within_m=5.0)
 SMALL = {"width_px": 64, "height_px": 64}
+SUPPLIED = Run(lockstep=True, energy=True)
 
 
 def _config(**settings: Any) -> Config:
-    everyday: dict[str, Any] = {
-        "mode": "lockstep",
-        "town": "blocks",
-        "sensing": "percepts",
-        "energy": True,
-    }
+    everyday: dict[str, Any] = {"town": "blocks", "sensing": "percepts"}
     return Config(**{**everyday, **settings})
 
 
-def _drive(config: Config, frames: int, past: list[TruePose] | None = None) -> list[Message]:
+def _drive(
+    config: Config, frames: int, past: list[TruePose] | None = None, run: Run = SUPPLIED
+) -> list[Message]:
     """What a robot that drives straight on publishes, perhaps after a restart."""
-    module = build(config)
+    module = build(config, run=run)
     assert module.start is not None
     if past is not None:
         assert module.restore is not None
@@ -164,7 +163,7 @@ def test_the_same_seed_gives_the_same_bytes_with_energy() -> None:
 
 
 def test_without_energy_nothing_of_it_is_published() -> None:
-    published = _drive(_config(energy=False), 5)
+    published = _drive(_config(), 5, run=LOCKSTEP)
 
     assert of_type(Energy, published) == []
     assert b"energy" not in b"".join(encode(message) for message in published)
@@ -173,11 +172,11 @@ def test_without_energy_nothing_of_it_is_published() -> None:
 
 
 def test_energy_changes_no_percept_of_a_building() -> None:
-    def buildings(energy: bool) -> list[list[object]]:
-        views = of_type(Percepts, _drive(_config(energy=energy), 40))
+    def buildings(run: Run) -> list[list[object]]:
+        views = of_type(Percepts, _drive(_config(), 40, run=run))
         return [[each for each in view.objects if each.function != "charge"] for view in views]
 
-    assert buildings(energy=True) == buildings(energy=False)
+    assert buildings(SUPPLIED) == buildings(LOCKSTEP)
 
 
 def test_a_true_pose_without_energy_reads_back_without_it() -> None:
@@ -190,5 +189,5 @@ def test_a_true_pose_without_energy_reads_back_without_it() -> None:
 def test_a_trajectory_with_energy_is_refused() -> None:
     line = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[])
 
-    with pytest.raises(ConfigError, match="set energy to false"):
-        build(Config(mode="lockstep", energy=True, trajectory=line))
+    with pytest.raises(ConfigError, match=r"set run\.energy to false"):
+        build(Config(trajectory=line), run=SUPPLIED)

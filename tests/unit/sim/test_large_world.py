@@ -148,7 +148,7 @@ def test_a_town_of_blocks_ends_by_time_and_publishes_what_closes() -> None:
     away_m = [math.dist(road.middle, (START.x_m, START.y_m)) for road in TOWN.roads]
     name = TOWN.roads[int(np.argmax(away_m))].name
     config = Config(town="blocks", town_size_m=150.0, duration_s=2.0, egl=False, width_px=64)
-    simulation = driven(config, ticks_per_frame=4)
+    simulation = driven(config, None, ticks_per_frame=4)
     simulation.drive(MotorCommand(left_wheel_rad_s=10.0, right_wheel_rad_s=10.0))
     assert simulation.changed_town() == []
 

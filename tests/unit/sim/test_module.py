@@ -12,6 +12,7 @@ from cogmap.bus.codec import encode
 from cogmap.errors import ConfigError, MessageError
 from cogmap.runtime import config
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP, REAL_TIME, Run
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock
 from cogmap.schemas.sensing import (
@@ -43,7 +44,7 @@ def _start(module: Module) -> list[Message]:
 
 
 def _lockstep(frames: int) -> list[Message]:
-    module = build(Config(mode="lockstep", **SMALL))
+    module = build(Config(**SMALL), run=LOCKSTEP)
     messages = _start(module)
     for number in range(frames):
         messages += module.feed(_command(messages[-1].stamp_ns, 15.0, 15.0 + number))
@@ -104,7 +105,7 @@ def _stamps_ns(kind: type[Message], messages: list[Message]) -> list[int]:
 
 
 def test_lockstep_ignores_commands_that_answer_another_frame() -> None:
-    module = build(Config(mode="lockstep", **SMALL))
+    module = build(Config(**SMALL), run=LOCKSTEP)
     stamp_ns = _start(module)[-1].stamp_ns
 
     other = _command(stamp_ns + 1)
@@ -235,7 +236,7 @@ def _wait_for_command(module: Module, seconds: int) -> list[list[Message]]:
 
 
 def test_in_lockstep_a_frame_that_nobody_answers_is_published_again() -> None:
-    module = build(Config(mode="lockstep", **SMALL))
+    module = build(Config(**SMALL), run=LOCKSTEP)
     first = _start(module)
     messages = _wait_for_command(module, 23)
     repeated = [second for second, published in enumerate(messages) if published]
@@ -250,7 +251,7 @@ def test_in_lockstep_a_frame_that_nobody_answers_is_published_again() -> None:
 
 
 def test_in_lockstep_a_frame_published_again_is_answered_only_once() -> None:
-    module = build(Config(mode="lockstep", **SMALL))
+    module = build(Config(**SMALL), run=LOCKSTEP)
     asked = _command(_start(module)[-1].stamp_ns)
     _wait_for_command(module, 11)
 
@@ -267,25 +268,25 @@ def test_a_frame_rate_that_does_not_divide_that_of_the_odometry_is_refused() -> 
         config.typed({"sim": {"frame_hz": 6}}, "sim", Config)
 
 
-@pytest.mark.parametrize("mode", ["real_time", "lockstep"])
+@pytest.mark.parametrize("run", [REAL_TIME, LOCKSTEP])
 def test_a_restarted_world_continues_where_it_was_with_the_robot_at_rest(
-    mode: str,
+    run: Run,
 ) -> None:
-    config = Config(mode=mode, egl=False, **SMALL)  # type: ignore[arg-type]
-    before = build(config)
+    config = Config(egl=False, **SMALL)
+    before = build(config, run=run)
     messages = _start(before)
-    if mode == "lockstep":
+    if run.lockstep:
         messages += before.feed(_command(messages[-1].stamp_ns))
     else:
         messages += _real_time(before, 90)
     poses = of_type(TruePose, messages)
     last_frame = of_type(StereoFrame, messages)[-1]
 
-    after = build(config)
+    after = build(config, run=run)
     assert after.restore is not None
     after.restore(poses)
     again = _start(after)
-    if mode == "real_time":
+    if not run.lockstep:
         again += _real_time(after, 4)
     odometry = of_type(Odometry, again)[0]
     frame = of_type(StereoFrame, again)[0]
@@ -309,8 +310,8 @@ SENSING = [{"sensing": "cameras"}, {"sensing": "percepts", "town": "blocks", "to
 def test_a_drive_that_ends_at_its_goal_is_over_once_the_robot_halts_there(
     sensing: dict[str, str | float],
 ) -> None:
-    settings = {"mode": "lockstep", "ends_at_goal": True, **SMALL, **sensing}
-    module = build(msgspec.convert(settings, Config))
+    settings = {"ends_at_goal": True, **SMALL, **sensing}
+    module = build(msgspec.convert(settings, Config), run=LOCKSTEP)
     messages = _start(module)
     assert of_type(TruePose, messages)[-1].progress < 1.0
 
@@ -320,7 +321,7 @@ def test_a_drive_that_ends_at_its_goal_is_over_once_the_robot_halts_there(
 
 
 def test_a_drive_that_does_not_end_at_its_goal_goes_on_there() -> None:
-    module = build(Config(mode="lockstep", **SMALL))
+    module = build(Config(**SMALL), run=LOCKSTEP)
     messages = _start(module)
     after = module.feed(_at_goal(messages[-1].stamp_ns))
 
@@ -329,12 +330,12 @@ def test_a_drive_that_does_not_end_at_its_goal_goes_on_there() -> None:
 
 
 def test_a_restarted_simulation_of_a_drive_that_was_over_stays_over() -> None:
-    config = Config(mode="lockstep", ends_at_goal=True, egl=False, **SMALL)
-    before = build(config)
+    config = Config(ends_at_goal=True, egl=False, **SMALL)
+    before = build(config, run=LOCKSTEP)
     messages = _start(before)
     messages += before.feed(_at_goal(messages[-1].stamp_ns))
 
-    after = build(config)
+    after = build(config, run=LOCKSTEP)
     assert after.restore is not None
     after.restore(of_type(TruePose, messages))
     again = _start(after)

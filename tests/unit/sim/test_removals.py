@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
+from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas.sensing import MotorCommand, Percepts, TrueTown
 from cogmap.services.sim.layout.removals import Removal, RemovedBuildings
 from cogmap.services.sim.module import Config, build
@@ -17,7 +18,6 @@ def _config(**changes: object) -> Config:
     exact = PerceptErrors(detected=1.0, right_name=1.0, precision=1.0)
     usual: dict[str, object] = {
         "seed": 3,
-        "mode": "lockstep",
         "town": "blocks",
         "sensing": "percepts",
     }
@@ -27,7 +27,7 @@ def _config(**changes: object) -> Config:
 
 def _views(config: Config, count: int) -> tuple[list[Percepts], list[TrueTown]]:
     """What a robot that stands sees."""
-    module = build(config)
+    module = build(config, run=LOCKSTEP)
     answers = list(module.start() if module.start else [])
     for _ in range(count):
         stamp_ns = of_type(Percepts, answers)[-1].stamp_ns
@@ -71,4 +71,4 @@ def test_the_removal_of_a_building_that_is_not_there_is_refused() -> None:
 
 def test_cameras_refuse_that_a_building_goes() -> None:
     with pytest.raises(ConfigError, match="removals"):
-        build(_config(sensing="cameras", removals=[Removal(building=0, from_s=1.0)]))
+        build(_config(sensing="cameras", removals=[Removal(building=0, from_s=1.0)]), run=LOCKSTEP)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
+from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas import topics
 from cogmap.schemas.sensing import MotorCommand, Percept, Percepts, Pose, SelfMotion, TruePose
 from cogmap.services.sim.module import Config, build, scripted
@@ -180,7 +181,7 @@ def test_a_place_is_recognized_in_the_same_direction_only() -> None:
 
 def test_each_command_leads_to_a_frame_until_the_line_ends() -> None:
     trajectory = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[HOUSE], speed_m_s=3.0)
-    module = build(Config(mode="lockstep", frame_hz=1, trajectory=trajectory))
+    module = build(Config(frame_hz=1, trajectory=trajectory), run=LOCKSTEP)
     assert module.start is not None
 
     messages = module.stamp(module.start())
@@ -198,7 +199,7 @@ def test_each_command_leads_to_a_frame_until_the_line_ends() -> None:
 
 def test_a_trajectory_in_real_time_is_refused() -> None:
     trajectory = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[])
-    config = Config(mode="real_time", trajectory=trajectory)
+    config = Config(trajectory=trajectory)
 
     with pytest.raises(ConfigError, match="lockstep"):
         build(config)

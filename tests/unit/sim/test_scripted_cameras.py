@@ -11,6 +11,7 @@ import pytest
 from cogmap.errors import ConfigError
 from cogmap.robot import calibration
 from cogmap.runtime.module import Module
+from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import (
     MotorCommand,
@@ -48,7 +49,8 @@ def _trajectory(line=BENT, landmarks=(BAKERY, CINEMA)) -> Trajectory:
 
 
 def _module(line: Trajectory, **settings) -> Module:
-    return build(Config(mode="lockstep", trajectory=line, frame_hz=1, noise=SILENT, **settings))
+    config = Config(trajectory=line, frame_hz=1, noise=SILENT, **settings)
+    return build(config, run=LOCKSTEP)
 
 
 def _ride(module: Module) -> list[list[Message]]:

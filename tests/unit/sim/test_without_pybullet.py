@@ -12,7 +12,7 @@ DRIVE = """
 from cogmap.schemas.sensing import MotorCommand, Percepts
 from cogmap.services import registry
 
-module = registry.build("sim", {"sim": settings})
+module = registry.build("sim", {"sim": settings, "run": {"lockstep": True}})
 messages = module.stamp(module.start())
 for _ in range(20):
     (seen,) = [message for message in messages if isinstance(message, Percepts)]
@@ -31,9 +31,8 @@ try:
 except UsageError as error:
     print(error)
 """
-TOWN = {"mode": "lockstep", "sensing": "percepts", "town": "blocks", "town_size_m": 120.0}
+TOWN = {"sensing": "percepts", "town": "blocks", "town_size_m": 120.0}
 LINE = {
-    "mode": "lockstep",
     "trajectory": {
         "line_m": [[0.0, 0.0], [60.0, 0.0]],
         "landmarks": [{"name": "house", "x_m": 30.0, "y_m": 12.0}],

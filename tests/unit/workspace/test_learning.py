@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 
+from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas.cognition import Broadcast, Coalition, Competition, Trigger
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Decay, Phase
@@ -20,6 +21,7 @@ from cogmap.services.workspace.config import Config
 from cogmap.services.workspace.learning.base_level import learned_operations, risen
 from tests.support.world.scenes import Desk, agent, graph_of, landmark, motion, percept, percepts
 
+CONSCIOUS = Run(lockstep=True, participants={"global_workspace": 1})
 LINEAR = Config(learning_rate=0.1, unlearning_rate=0.4)
 SIGMOID = Config(learning_rate=0.1, learning="sigmoid")
 
@@ -137,7 +139,7 @@ def _begun(desk: Desk) -> list[int]:
 
 
 def test_in_lockstep_a_cycle_waits_for_the_competition_before_and_its_broadcast() -> None:
-    desk = Desk("w1", awaits_competition=True)
+    desk = Desk("w1", run=CONSCIOUS)
     desk.drive(range(1), percept("house"))
     desk.see(1, percept("house"))
     assert _begun(desk) == [1]
@@ -152,7 +154,7 @@ def test_in_lockstep_a_cycle_waits_for_the_competition_before_and_its_broadcast(
 def test_what_arrives_first_changes_nothing() -> None:
     digests = []
     for is_early in (True, False):
-        desk = Desk("w1", awaits_competition=True)
+        desk = Desk("w1", run=CONSCIOUS)
         desk.drive(range(1), percept("house"))
         if is_early:
             _compete(desk, 1, landmark("house"))
@@ -166,7 +168,7 @@ def test_what_arrives_first_changes_nothing() -> None:
 
 
 def test_a_cycle_learns_from_each_broadcast_once() -> None:
-    desk = Desk("w1", awaits_competition=True)
+    desk = Desk("w1", run=CONSCIOUS)
     desk.drive(range(1), percept("house"))
     before = _base_level(desk)
     _compete(desk, 1, landmark("house"))
@@ -181,7 +183,7 @@ def test_a_cycle_learns_from_each_broadcast_once() -> None:
 
 
 def test_a_view_that_is_repeated_begins_its_cycle_without_a_competition_that_was_lost() -> None:
-    desk = Desk("w1", awaits_competition=True)
+    desk = Desk("w1", run=CONSCIOUS)
     desk.drive(range(1))
     desk.see(1)
     assert _begun(desk) == [1]
@@ -192,9 +194,9 @@ def test_a_view_that_is_repeated_begins_its_cycle_without_a_competition_that_was
 
 
 def test_a_restored_workspace_waits_for_no_competition_before_and_learns_what_is_left() -> None:
-    desk = Desk("w1", awaits_competition=True)
+    desk = Desk("w1", run=CONSCIOUS)
     desk.drive(range(1), percept("house"))
-    again = Desk("w1", awaits_competition=True)
+    again = Desk("w1", run=CONSCIOUS)
     assert again.module.restore is not None
     again.module.restore(desk.deltas)
 
@@ -207,7 +209,7 @@ def test_a_restored_workspace_waits_for_no_competition_before_and_learns_what_is
 
 
 def test_in_real_time_a_cycle_takes_what_has_come() -> None:
-    desk = Desk("w1", mode="real_time")
+    desk = Desk("w1", run=REAL_TIME)
     desk.drive(range(1), percept("house"))
     desk.see(1, percept("house"))
 

@@ -6,10 +6,11 @@ from collections import Counter
 
 import pytest
 
+from cogmap.runtime.run import REAL_TIME
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.nodes import Self
 from cogmap.schemas.process import Presence
-from cogmap.services.codelets.resolution.coarse_places import Config as CoarsePlacesConfig
+from cogmap.services.codelets.sub_maps.coarse_places import Config as CoarsePlacesConfig
 from tests.support.messages import of_type
 from tests.support.world.scenes import (
     PERIOD_NS,
@@ -38,7 +39,7 @@ def _held(desk: Desk, asked: Task) -> tuple[str, int]:
 
 def _real_time(*workers: str) -> tuple[Desk, Task]:
     """A workspace in real time that has just asked for a localization, and what it asked."""
-    desk = Desk(*workers, mode="real_time", lease_ms=100.0, deadline_ms=180.0)
+    desk = Desk(*workers, run=REAL_TIME, lease_ms=100.0, deadline_ms=180.0)
     desk.clock(stamp_ns(0))
     desk.see(0)
     (asked,) = desk.take()
@@ -160,7 +161,7 @@ def test_the_only_worker_keeps_its_task_past_the_lease_until_another_joins() -> 
 
 
 def test_a_task_that_no_worker_holds_is_given_to_the_first_that_joins() -> None:
-    desk = Desk(mode="real_time", deadline_ms=10_000.0)
+    desk = Desk(run=REAL_TIME, deadline_ms=10_000.0)
     desk.see(0)
     desk.clock(_after(0, 5_000))
     desk.presence("w1")
@@ -170,7 +171,7 @@ def test_a_task_that_no_worker_holds_is_given_to_the_first_that_joins() -> None:
 
 
 def test_a_task_lost_at_every_attempt_is_given_up_and_the_cycle_continues() -> None:
-    desk = Desk("w1", "w2", mode="real_time", lease_ms=10.0, deadline_ms=10_000.0, attempts=3)
+    desk = Desk("w1", "w2", run=REAL_TIME, lease_ms=10.0, deadline_ms=10_000.0, attempts=3)
     desk.clock(stamp_ns(0))
     desk.see(0)
     for number, ms in enumerate((11, 22, 33)):
@@ -236,7 +237,7 @@ def test_a_clock_that_once_ran_far_ahead_spoils_no_later_cycle() -> None:
 
 
 def test_a_part_of_the_answers_is_committed_at_the_deadline() -> None:
-    desk = Desk("w1", "w2", mode="real_time")
+    desk = Desk("w1", "w2", run=REAL_TIME)
     desk.see(0, percept("a"), percept("b"))
     (localization,) = desk.take()
     desk.feed(answer(localization, [_moved_self(0)]))
@@ -267,7 +268,7 @@ def test_background_work_is_given_out_after_what_the_broadcast_waits_for() -> No
 
 
 def test_background_work_begins_in_a_cycle_that_ends_at_its_deadline_too() -> None:
-    desk = Desk("w1", mode="real_time", deadline_ms=180.0)
+    desk = Desk("w1", run=REAL_TIME, deadline_ms=180.0)
     every = CoarsePlacesConfig().every_cycles
     desk.drive(range(every - 1))
 
@@ -331,7 +332,7 @@ def test_unused_motion_is_given_to_the_next_cycles_localization() -> None:
 
 
 def test_workers_that_never_answer_leave_the_deltas_without_a_gap() -> None:
-    desk = Desk("w1", mode="real_time")
+    desk = Desk("w1", run=REAL_TIME)
     for frame in range(5):
         desk.see(frame, percept("a"))
         desk.clock(stamp_ns(frame) + PERIOD_NS)

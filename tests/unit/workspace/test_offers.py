@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cogmap.runtime.run import Run
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import (
@@ -16,6 +17,8 @@ from cogmap.schemas.nodes import (
 )
 from tests.support.messages import of_type
 from tests.support.world.scenes import Desk, agent, percept, thing
+
+OFFERED = Run(lockstep=True, participants={"memory": 1})
 
 
 def _offer(name: str, cycle: int = 0, source: str = "goal", seq: int = 0) -> Offer:
@@ -51,7 +54,7 @@ def test_an_offer_of_what_only_codelets_write_is_rejected_and_counted() -> None:
 
 
 def test_in_lockstep_a_cycle_waits_for_the_offers_that_are_declared() -> None:
-    desk = Desk("w1", offering=("memory",))
+    desk = Desk("w1", run=OFFERED)
     desk.drive(range(1))
     ended = desk.deltas[-1].cycle
     desk.see(1)

@@ -6,12 +6,15 @@ from collections.abc import Sequence
 
 import pytest
 
+from cogmap.runtime.run import Run
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import Node
 from tests.support.messages import of_type
 from tests.support.world.scenes import Desk, percept, thing
+
+OFFERED = Run(lockstep=True, participants={"memory": 1})
 
 
 def _restored(past: Sequence[Message]) -> Desk:
@@ -100,7 +103,7 @@ def test_a_cycle_whose_view_does_not_come_again_ends_when_the_next_view_comes() 
     whole.drive(range(3), percept("a"))
     interrupted = whole.deltas[:-2]
 
-    again = Desk("w1", offering=("memory",))
+    again = Desk("w1", run=OFFERED)
     assert again.module.restore is not None
     again.module.restore(list(interrupted))
     cycle = interrupted[-1].cycle

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 from cogmap.errors import MessageError
+from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.sensing import RangeScan
 from tests.support.world.scenes import Desk, motion, percepts, stamp_ns
 
 RAYS = ((0.1, 5.0), (0.0, 0.0))
+SCANNED = Run(lockstep=True, participants={"sim": 1})
 LATE_MS = 30
 
 
@@ -51,13 +53,13 @@ def _rounded(rays: Sequence[Sequence[float]]) -> list[list[float]]:
 @pytest.fixture
 def stepped() -> Desk:
     """In lockstep, with scans."""
-    return Desk("w1", awaits_scan=True)
+    return Desk("w1", run=SCANNED)
 
 
 @pytest.fixture
 def timely() -> Desk:
     """In real time."""
-    return Desk("w1", mode="real_time", max_scan_age_ms=LATE_MS)
+    return Desk("w1", run=REAL_TIME, max_scan_age_ms=LATE_MS)
 
 
 def test_in_lockstep_a_cycle_waits_for_the_scan_of_its_view(stepped: Desk) -> None:
@@ -71,7 +73,7 @@ def test_in_lockstep_a_cycle_waits_for_the_scan_of_its_view(stepped: Desk) -> No
 
 
 def test_in_lockstep_a_scan_may_come_before_or_after_its_view(stepped: Desk) -> None:
-    other = Desk("w1", awaits_scan=True)
+    other = Desk("w1", run=SCANNED)
     for frame in range(3):
         stepped.feed(_scan(frame))
         _view(stepped, frame)
@@ -97,7 +99,7 @@ def test_a_scan_that_is_published_again_changes_nothing(stepped: Desk) -> None:
 def test_an_interrupted_cycle_waits_for_its_scan_again(stepped: Desk) -> None:
     stepped.feed(_scan(0))
     _view(stepped, 0)
-    restarted = Desk("w1", awaits_scan=True)
+    restarted = Desk("w1", run=SCANNED)
     assert restarted.module.restore is not None
     restarted.module.restore(stepped.deltas[:2])
 
@@ -109,7 +111,7 @@ def test_an_interrupted_cycle_waits_for_its_scan_again(stepped: Desk) -> None:
 
 
 def test_in_lockstep_without_scans_none_is_used_whenever_it_comes() -> None:
-    desk = Desk("w1", awaits_scan=False)
+    desk = Desk("w1")
     desk.feed(_scan(0))
     _view(desk, 0)
 

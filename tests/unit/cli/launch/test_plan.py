@@ -15,8 +15,8 @@ from cogmap.cli.launch.plan import (
     RECORDER,
     ROUTER,
     Choices,
-    awaited,
     effective,
+    participants,
     programs,
     to_toml,
 )
@@ -29,7 +29,7 @@ from cogmap.services.sim.layout.town import generate
 
 
 def configured(choices: Choices, **sections: dict[str, object]) -> dict[str, dict[str, Any]]:
-    return effective(sections, choices, awaited(choices, observer=True))
+    return effective(sections, choices, observer=True)
 
 
 def test_the_configuration_reads_back_from_toml_to_the_same() -> None:
@@ -123,22 +123,21 @@ def test_elsewhere_the_agent_has_no_goals_at_its_start(
     assert not sections["sim"]["ends_at_goal"]
 
 
-def test_lockstep_is_the_mode_of_all_that_have_one() -> None:
-    sections = configured(Choices(lockstep=True))
-
-    for name in ("sim", "workspace", "procedural", "motor"):
-        assert sections[name]["mode"] == "lockstep"
+def test_a_drive_is_in_real_time_unless_lockstep_is_chosen() -> None:
+    assert not configured(Choices())["run"]["lockstep"]
+    assert configured(Choices(lockstep=True))["run"]["lockstep"]
 
 
 def test_energy_is_off_unless_it_is_chosen() -> None:
-    assert not configured(Choices())["sim"]["energy"]
-    assert configured(Choices(energy=True))["sim"]["energy"]
+    assert not configured(Choices())["run"]["energy"]
+    assert configured(Choices(energy=True))["run"]["energy"]
 
 
 def test_the_drive_waits_for_every_module_every_worker_and_whoever_watches() -> None:
-    awaits = configured(Choices(codelets=3))["sim"]["awaits"]
+    members = configured(Choices(codelets=3))["run"]["participants"]
 
-    assert awaits == {
+    assert members == {
+        "sim": 1,
         "sensory": 1,
         "epam": 1,
         "workspace": 1,
@@ -151,7 +150,9 @@ def test_the_drive_waits_for_every_module_every_worker_and_whoever_watches() -> 
         RECORDER: 1,
         OBSERVER: 1,
     }
-    assert awaited(Choices(record=False), observer=False).keys().isdisjoint({RECORDER, OBSERVER})
+    assert (
+        participants(Choices(record=False), observer=False).keys().isdisjoint({RECORDER, OBSERVER})
+    )
 
 
 @pytest.mark.parametrize(
@@ -211,11 +212,11 @@ def test_modules_of_ones_own_are_not_started_and_waited_for(tmp_path: Path) -> N
     choices = Choices(without=["epam", "codelets"], codelets=2)
     every = {*registry.MODULES, RECORDER, ROUTER}
 
-    awaits = awaited(choices, observer=True)
+    members = participants(choices, observer=True)
 
     assert instances(tmp_path, choices) == every - {"epam", "codelets"}
-    assert awaits["epam"] == 1
-    assert awaits["codelets"] == 2
+    assert members["epam"] == 1
+    assert members["codelets"] == 2
 
 
 def test_an_existing_router_is_used_and_none_started(tmp_path: Path) -> None:

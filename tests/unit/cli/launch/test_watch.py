@@ -317,7 +317,7 @@ def run_metrics(watch: Watch) -> RunMetrics:
         ended_by="route complete",
         reason="the agent was at every goal: corner 1",
         seed=1,
-        mode="real_time",
+        lockstep=False,
         codelets=1,
         wall_s=1.0,
         start_s={},

@@ -44,7 +44,7 @@ def drive(tmp_path: Path) -> Path:
         messages.append(true_pose(seq))
         messages.append(turn_of_wheels(seq))
 
-    config = json.dumps({"sim": {"seed": 7, "mode": "lockstep"}})
+    config = json.dumps({"sim": {"seed": 7}, "run": {"lockstep": True}})
     return write(tmp_path / "drive.mcap", messages, config)
 
 
@@ -52,7 +52,7 @@ def test_a_summary_has_the_drive_and_its_settings(drive: Path) -> None:
     found = log_facts("summary", drive)
 
     assert found["seed"] == 7
-    assert found["mode"] == "lockstep"
+    assert found["lockstep"]
     assert found["drive_s"] == 5.0
     assert found["distance_m"] == 5.0
     assert found["completed"]
@@ -73,7 +73,7 @@ def test_settings_that_a_log_lacks_are_the_defaults(tmp_path: Path) -> None:
     found = log_facts("summary", log)
 
     assert found["seed"] == 1
-    assert found["mode"] == "real_time"
+    assert not found["lockstep"]
 
 
 def test_a_log_without_true_poses_is_said_to_have_none(tmp_path: Path) -> None:

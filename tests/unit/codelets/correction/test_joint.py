@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.pose_graph import Constraints, PoseGraph
 from cogmap.geometry.se2 import integrate, transform_to
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.correction.joint import by_side, optimize_jointly
-from cogmap.services.codelets.correction.least_squares import optimize
-from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
 from cogmap.services.codelets.mapping.observations import Sightings
 from tests.support.paths import mean_distance_m
 

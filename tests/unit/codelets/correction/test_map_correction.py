@@ -11,6 +11,7 @@ import pytest
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import motion_onto, relative
 from cogmap.graph.path import rows_of
+from cogmap.runtime.run import REAL_TIME
 from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import (
     CORRECTION_ID,
@@ -229,7 +230,7 @@ def test_lockstep_commits_the_correction_at_its_cycle_and_not_before() -> None:
 
 
 def test_real_time_continues_without_the_correction_by_other_workers() -> None:
-    drive = round_once(LoopDrive(mode="real_time", workers=2))
+    drive = round_once(LoopDrive(run=REAL_TIME, workers=2))
     desk = drive.desk
     desk.withhold = "map_correction"
     drive.meet(3)

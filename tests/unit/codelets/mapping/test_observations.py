@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
+from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.pose_graph import Constraints, PoseGraph
 from cogmap.geometry.se2 import compose, relative
 from cogmap.schemas.nodes import Observations, PathSegment
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.correction.joint import with_landmarks
-from cogmap.services.codelets.correction.least_squares import optimize
-from cogmap.services.codelets.correction.pose_graph import Constraints, PoseGraph
 from cogmap.services.codelets.mapping.observations import Sightings, Viewpoint, extended
 from tests.support.paths import mean_distance_m
 from tests.support.world.scenes import Desk, percept

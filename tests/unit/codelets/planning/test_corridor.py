@@ -25,8 +25,8 @@ from cogmap.services.codelets.planning.corridor import corridor
 from cogmap.services.codelets.planning.held import held_routes
 from cogmap.services.codelets.planning.route_plan import run
 from cogmap.services.codelets.planning.targets import goals_m
-from cogmap.services.codelets.resolution import coarse_places, sub_map_places
-from cogmap.services.codelets.resolution.sub_map_grid import SETTLED_CYCLES
+from cogmap.services.codelets.sub_maps import coarse_places, sub_map_places
+from cogmap.services.codelets.sub_maps.sub_map_grid import SETTLED_CYCLES
 from tests.support.world.scenes import agent, graph_of, task
 
 SIDE = 240

@@ -1,0 +1,201 @@
+"""Loop closures that state the same, judged as one hypothesis against all else that is known
+(beyond the paper).
+
+Two streets that look alike give closures that agree with one another: many as they are, they are
+all mistaken at once. What all others contradict once it is left out is not believed.
+
+By how much closures may be off, the path tells itself. Where it fits better than its information
+states, that is understated, and a false closure would seem possible that is not. The variance
+factor (a posteriori variance of unit weight: the least cost over the degrees of freedom) scales it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import KDTree
+from scipy.special import chdtri
+
+from cogmap.estimation.incremental import IncrementalSolver
+from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.pose_graph import Constraints, PoseGraph, cost
+from cogmap.geometry.arrays import Booleans, Floats, Indices
+
+SAME_PLACES = 5
+# A path that a false hypothesis has bent is far from linear: so many in a row, of those that seem
+# most doubtful, must hold when it is solved again without them.
+DOUBTED = 3
+# What the information states of a pose counts as much as one more hypothesis that fits as stated.
+STATED_DEGREES = 3
+
+
+class Hypotheses:
+    """The closures of a path by what they state: those that lead from within SAME_PLACES of one
+    place to within as many of another are one hypothesis.
+
+    A true closure exceeds `threshold` (m,), in squared Mahalanobis distance, with probability
+    `false_closure`.
+    """
+
+    def __init__(self, graph: PoseGraph, false_closure: float) -> None:
+        self._graph = graph
+        self._false_closure = false_closure
+        self._degrees = _degrees(graph.closures)
+        self.threshold: Floats = chdtri(self._degrees, false_closure)
+        self._support = _sizes(_alike(graph.closures))
+
+    @property
+    def shares(self) -> Floats:
+        """(m,): the weights by which each hypothesis counts once."""
+        shares: Floats = 1 / self._support
+        return shares
+
+    def settled(self, accepted: Booleans) -> Booleans:
+        """(m,): which closures hold, from those `accepted` so far: none that all others contradict,
+        and all that agree with all others.
+        """
+        remaining, factor = self._without_contradicted(accepted)
+        return self._readmitted(remaining, factor)
+
+    def truncated_cost(self, accepted: Booleans) -> float:
+        """What truncated least squares makes least: the cost of the path by the accepted closures,
+        and the thresholds of all others, each hypothesis counted once.
+        """
+        closures = self._graph.closures.weighted(self.shares).select(accepted)
+        graph = self._graph.with_closures(closures)
+        path_cost = cost(optimize(graph), graph.constraints)
+
+        truncated = (self.shares * self.threshold)[~accepted]
+        return path_cost + float(truncated.sum())
+
+    def _without_contradicted(self, accepted: Booleans) -> tuple[Booleans, float]:
+        """(m,): which are left once no hypothesis is that all others contradict; and the variance
+        factor by those.
+        """
+        remaining = accepted
+        factor = 1.0
+        while remaining.any():
+            solver = IncrementalSolver(self._with(remaining))
+            factor = self._variance_factor(solver, remaining)
+            doubtful = _by_doubt(solver, np.flatnonzero(remaining))
+
+            left = self._tested(doubtful, remaining, factor)
+            if left.sum() == remaining.sum():
+                break
+            remaining = left
+
+        return remaining, factor
+
+    def _tested(self, doubtful: list[Indices], accepted: Booleans, factor: float) -> Booleans:
+        """(m,): the accepted without those of the doubtful hypotheses that the rest contradict,
+        until DOUBTED in a row are not contradicted.
+        """
+        remaining = accepted
+        held = 0
+        for members in doubtful:
+            others = remaining.copy()
+            others[members] = False
+
+            if self._contradict(others, members, factor):
+                remaining = others
+                held = 0
+            else:
+                held += 1
+            if held == DOUBTED:
+                break
+
+        return remaining
+
+    def _contradict(self, others: Booleans, members: Indices, factor: float) -> bool:
+        """Whether a path by the others contradicts a hypothesis, by its middle closure."""
+        solver = IncrementalSolver(self._with(others))
+        middle = members[len(members) // 2]
+        return self._misfit(solver, middle) > factor
+
+    def _misfit(self, solver: IncrementalSolver, number: int) -> float:
+        """A closure's distance from what the solver's predict of it, over its threshold."""
+        closure = self._graph.closures.select(np.array([number]))
+        return solver.chi_square(closure) / float(self.threshold[number])
+
+    def _variance_factor(self, solver: IncrementalSolver, accepted: Booleans) -> float:
+        """By how much the variances are less than stated, of a path by the accepted closures: 1
+        where they are not, or where there are too few hypotheses to know.
+
+        It is the greatest that the cost allows for, but with probability `false_closure`.
+        Closures of one hypothesis may err alike, and give one's degrees of freedom together.
+        """
+        closures = self._graph.closures.select(accepted)
+        shares = 1 / _sizes(_alike(closures))
+        degrees = float(self._degrees[accepted] @ shares)
+
+        least_cost = float(chdtri(degrees, 1 - self._false_closure))
+        return min(1.0, (STATED_DEGREES + solver.cost) / least_cost)
+
+    def _readmitted(self, accepted: Booleans, factor: float) -> Booleans:
+        """(m,): the accepted, and the outliers that agree with all inliers: the path between the
+        two may be long and uncertain. What most closures state comes first.
+        """
+        solver = IncrementalSolver(self._with(accepted))
+        result = accepted.copy()
+
+        order = np.argsort(-self._support, kind="stable")
+        outliers = order[~accepted[order]]
+        for number in outliers.tolist():
+            if self._misfit(solver, number) <= factor:
+                closure = self._graph.closures.select(np.array([number]))
+                solver.add(closure)
+                result[number] = True
+
+        return result
+
+    def _with(self, accepted: Booleans) -> PoseGraph:
+        """The path with the accepted closures alone."""
+        closures = self._graph.closures.select(accepted)
+        return self._graph.with_closures(closures)
+
+
+def _degrees(closures: Constraints) -> Floats:
+    """(m,): the degrees of freedom of each closure, the rank of its information."""
+    eigenvalues = np.linalg.eigvalsh(closures.information)
+    largest = eigenvalues[:, -1:]
+    is_measured = eigenvalues > 1e-9 * largest
+
+    degrees: Floats = is_measured.sum(axis=1).astype(np.float64)
+    return degrees
+
+
+def _alike(closures: Constraints) -> list[list[int]]:
+    """(m,): which closures, itself among them, state the same as each."""
+    ends = np.column_stack([closures.i, closures.j]).astype(np.float64)
+    tree = KDTree(ends)
+
+    alike: list[list[int]] = tree.query_ball_point(
+        ends, SAME_PLACES, p=np.inf, return_sorted=True
+    ).tolist()
+    return alike
+
+
+def _sizes(groups: list[list[int]]) -> Floats:
+    sizes = [len(group) for group in groups]
+    return np.array(sizes, np.float64)
+
+
+def _by_doubt(solver: IncrementalSolver, numbers: Indices) -> list[Indices]:
+    """The hypotheses among a solver's closures, whose `numbers` (k,) are given, the one first of
+    which all others predict the least, linearly.
+    """
+    closures = solver.graph.closures
+    hypotheses: list[Indices] = []
+    doubts: list[float] = []
+
+    is_listed = np.zeros(len(numbers), bool)
+    for index, group in enumerate(_alike(closures)):
+        if is_listed[index]:
+            continue
+
+        members = np.array(group)
+        is_listed[members] = True
+        hypotheses.append(numbers[members])
+        doubts.append(solver.chi_square_without(closures.select(members)))
+
+    order = np.argsort(-np.array(doubts), kind="stable")
+    return [hypotheses[index] for index in order.tolist()]

@@ -1,0 +1,217 @@
+"""Which loop closures agree with one another: a single view may be of another place or landmark
+than it seems.
+
+Beyond the paper, whose landmarks are never confused. Two closures agree where what they join is as
+far apart on this pass as it was on the earlier one, by path integration within each pass alone;
+what the agent believes of its pose is not used. At least MIN_AGREEING must agree with one another
+(pairwise consistency, as in Mangelson et al. 2018, doi 10.1109/ICRA.2018.8460217).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import chdtri
+
+from cogmap.estimation.pose_graph import Constraints, adjacency
+from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.se2 import cumulative, integrate, transform_from, wrap_angle
+
+MIN_AGREEING = 3
+# With more uncertainty between them than this, any two views would agree.
+MAX_SD_M = 5.0
+# Each view is compared with so many that follow it.
+NEIGHBOURS = 31
+
+
+class Points(NamedTuple):
+    """m points `at_m` (m, 2), each in the frame of the path's place `place` (m,)."""
+
+    place: Indices
+    at_m: Floats
+
+    @property
+    def range_m(self) -> Floats:
+        """(m,): how far the points are from their places."""
+        return _lengths(self.at_m)
+
+
+class Views(NamedTuple):
+    """m views from places `j` (m,) of the path, of what was seen from places `i` (m,) before.
+
+    It stands at `there_m` (m, 2) in the frame of place i and at `here_m` (m, 2) in that of place j,
+    x forward, y left, known to `sd_m` (m,). The heading between the two places is known to
+    `sd_rad` (m,), or unknown where that is 0.
+    """
+
+    i: Indices
+    j: Indices
+    there_m: Floats
+    here_m: Floats
+    sd_m: Floats
+    sd_rad: Floats
+
+    @property
+    def has_heading(self) -> Booleans:
+        """(m,): whether the heading between the two places is known."""
+        return self.sd_rad > 0
+
+    @property
+    def there(self) -> Points:
+        """What was seen, from the places before."""
+        return Points(self.i, self.there_m)
+
+    @property
+    def here(self) -> Points:
+        """What was seen, from the later places."""
+        return Points(self.j, self.here_m)
+
+    def select(self, chosen: Booleans | Indices) -> Views:
+        """The chosen ones, by mask or indices."""
+        return Views(
+            i=self.i[chosen],
+            j=self.j[chosen],
+            there_m=self.there_m[chosen],
+            here_m=self.here_m[chosen],
+            sd_m=self.sd_m[chosen],
+            sd_rad=self.sd_rad[chosen],
+        )
+
+
+def consistent(views: Views, steps: Constraints, false_closure: float) -> Booleans:
+    """(m,): which views are among MIN_AGREEING that all agree with one another.
+
+    `steps` are those of the path; views that agree are taken for disagreeing with probability
+    `false_closure`.
+    """
+    one, other = _pairs(views)
+    path = _DeadReckoning(steps)
+    agree = _agree(views.select(one), views.select(other), path, false_closure)
+
+    joined = adjacency(one[agree], other[agree], len(views.i))
+    joined_by_one = joined @ joined
+
+    triangles = joined_by_one.multiply(joined).sum(axis=1)
+    return np.asarray(triangles).ravel() > 0
+
+
+def _pairs(views: Views) -> tuple[Indices, Indices]:
+    """Pairs of views to compare, by number: each with those that follow it along the path."""
+    count = len(views.i)
+    numbers = np.arange(count)
+    order = np.lexsort((numbers, views.j))
+
+    nothing = np.zeros(0, np.int64)
+    ones = [nothing]
+    others = [nothing]
+    for apart in range(1, min(NEIGHBOURS + 1, count)):
+        ones.append(order[:-apart])
+        others.append(order[apart:])
+
+    return np.concatenate(ones), np.concatenate(others)
+
+
+class _DeadReckoning:
+    """A path by path integration alone, from its beginning, and the variances summed along it."""
+
+    def __init__(self, steps: Constraints) -> None:
+        origin = np.zeros(3)
+        self.poses = integrate(origin, steps.measurement)
+
+        lengths_m = _lengths(steps.measurement[:, :2])
+        self._length_m = cumulative(lengths_m)
+        self._variance_m2 = cumulative(steps.variance_m2)
+        self._variance_rad2 = cumulative(steps.variance_rad2)
+
+    def between_m(self, one: Points, other: Points) -> Floats:
+        """(m,): the distance between the points of either."""
+        pose = self.poses[one.place]
+        other_pose = self.poses[other.place]
+
+        point_m = transform_from(pose, one.at_m)
+        other_point_m = transform_from(other_pose, other.at_m)
+        return _lengths(point_m - other_point_m)
+
+    def variance_m2(self, one: Points, other: Points) -> Floats:
+        """(m,): the variance of `between_m`: of the steps, and of the turns at their lever arm."""
+        length_m = _between(self._length_m, one.place, other.place)
+        lever_arm_m = np.maximum(one.range_m, other.range_m)
+        lever_m2 = length_m**2 / 3 + lever_arm_m**2
+
+        by_steps_m2 = _between(self._variance_m2, one.place, other.place)
+        turn_rad2 = self.variance_rad2(one.place, other.place)
+        by_turns_m2 = turn_rad2 * lever_m2
+        variance_m2: Floats = by_steps_m2 + by_turns_m2
+        return variance_m2
+
+    def turn_rad(self, one: Indices, other: Indices) -> Floats:
+        """(m,): the heading at one place less that at another."""
+        headings_rad = self.poses[:, 2]
+
+        turn_rad: Floats = headings_rad[one] - headings_rad[other]
+        return turn_rad
+
+    def variance_rad2(self, one: Indices, other: Indices) -> Floats:
+        """(m,): the variance of `turn_rad`."""
+        return _between(self._variance_rad2, one, other)
+
+
+def _between(summed: Floats, one: Indices, other: Indices) -> Floats:
+    """(m,): how much a running sum changes between two places each, in either direction."""
+    change = summed[one] - summed[other]
+    return np.asarray(np.abs(change))
+
+
+def _lengths(vectors: Floats) -> Floats:
+    """(m,): the lengths of (m, 2) vectors."""
+    x, y = vectors.T
+    return np.asarray(np.hypot(x, y))
+
+
+def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float) -> Booleans:
+    """(m,): which pairs of views agree."""
+    there_m2 = path.variance_m2(one.there, other.there)
+    here_m2 = path.variance_m2(one.here, other.here)
+    path_m2 = there_m2 + here_m2
+
+    has_heading = one.has_heading & other.has_heading
+    squared = _distance_squared(one, other, path, path_m2)
+    squared += np.where(has_heading, _turn_squared(one, other, path), 0.0)
+
+    degrees = np.where(has_heading, 3, 2)
+    is_consistent = squared <= chdtri(degrees, false_closure)
+
+    is_near = path_m2 <= MAX_SD_M**2
+    is_apart = one.j != other.j
+    agree: Booleans = is_consistent & is_near & is_apart
+    return agree
+
+
+def _distance_squared(one: Views, other: Views, path: _DeadReckoning, path_m2: Floats) -> Floats:
+    """(m,): the squared Mahalanobis distance of how far apart two views' points are on either pass,
+    path integration being uncertain by `path_m2`.
+    """
+    there_m = path.between_m(one.there, other.there)
+    here_m = path.between_m(one.here, other.here)
+    difference_m = there_m - here_m
+
+    variance_m2 = one.sd_m**2 + other.sd_m**2 + path_m2
+    squared: Floats = difference_m**2 / variance_m2
+    return squared
+
+
+def _turn_squared(one: Views, other: Views, path: _DeadReckoning) -> Floats:
+    """(m,): the squared Mahalanobis distance of the turn between two views on either pass."""
+    here_rad = path.turn_rad(one.j, other.j)
+    there_rad = path.turn_rad(one.i, other.i)
+    turned_rad = wrap_angle(here_rad - there_rad)
+
+    seen_rad2 = one.sd_rad**2 + other.sd_rad**2
+    there_rad2 = path.variance_rad2(one.i, other.i)
+    here_rad2 = path.variance_rad2(one.j, other.j)
+    variance_rad2 = seen_rad2 + there_rad2 + here_rad2
+
+    positive_rad2 = np.maximum(variance_rad2, 1e-12)
+    squared: Floats = turned_rad**2 / positive_rad2
+    return squared

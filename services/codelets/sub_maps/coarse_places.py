@@ -1,0 +1,157 @@
+"""The coarse-places codelet: the root map's place nodes on coarser grids too, one map each (paper
+§5.2: several maps of different resolution).
+
+It runs beside the cycle. A task makes anew what is around the agent, and one block of the whole
+map, another each time: what a corrected map moved is up to date again after a while.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cogmap.errors import MessageError
+from cogmap.graph.graph import Graph
+from cogmap.graph.window import WEIGHT_COLUMNS, Extent
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Operation, Phase
+from cogmap.schemas.nodes import ROOT_MAP, SELF_ID, Map, PlaceColumn, Self, coarse_map_id
+from cogmap.services.codelets.cells import changed_cells
+from cogmap.services.codelets.sub_maps.coarsening import (
+    FACTOR,
+    MARGIN,
+    Places,
+    coarser,
+    places_of,
+)
+from cogmap.services.codelets.sub_maps.resolution_config import COARSE_PLACES
+from cogmap.services.codelets.sub_maps.resolution_config import CoarsePlacesConfig as Config
+
+LEVELS = 2
+CELLS = FACTOR**LEVELS
+"""The cells of the root map along the side of the coarsest map's cell."""
+
+BLOCK = 16
+"""The cells of the coarsest map along the side of a block."""
+
+COARSE = (PlaceColumn.ROAD, *WEIGHT_COLUMNS)
+COLUMNS = (*COARSE, PlaceColumn.OBSTACLE)
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task every `every_cycles`."""
+    if graph.agent is None or context.cycle % config.every_cycles:
+        return []
+    return [context.task(CODELET.name, about=[SELF_ID])]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """The coarse places that have changed; first of all, the maps that they are in."""
+    agent = graph.agent
+    if agent is None:
+        raise MessageError(f"task {task.task_id}: the graph has no self node")
+
+    missing = _missing(graph)
+    if missing:
+        return Answer(missing)
+
+    answer = Answer()
+    blocks = _blocks(graph.places.extent(ROOT_MAP))
+    if blocks:
+        turn = task.cycle // config.every_cycles
+        answer.operations.extend(_update(graph, blocks[turn % len(blocks)]))
+    if agent.map == ROOT_MAP:
+        answer.operations.extend(_update(graph, _around(agent, graph, config)))
+
+    return answer
+
+
+def make_all(graph: Graph) -> None:
+    """Give a graph all of its coarse maps at once, as they are in one that was long at work."""
+    graph.change(_missing(graph))
+    for block in _blocks(graph.places.extent(ROOT_MAP)):
+        graph.change(_update(graph, block))
+
+
+CODELET = Codelet(
+    name="coarse_places",
+    phase=Phase.BACKGROUND,
+    due=due,
+    run=run,
+    reads=frozenset({Self, Map, *COLUMNS}),
+    writes=frozenset({Map, *COARSE}),
+    config=Config,
+    section=COARSE_PLACES,
+)
+
+
+def _missing(graph: Graph) -> list[Operation]:
+    """The nodes of the coarse maps that do not exist yet."""
+    missing: list[Operation] = []
+    for level in range(1, LEVELS + 1):
+        identifier = coarse_map_id(level)
+        if graph.get(Map, identifier) is None:
+            cell_m = graph.cell_m(ROOT_MAP) * FACTOR**level
+            missing.append(Map(id=identifier, base_level=1.0, cell_m=cell_m, parent=ROOT_MAP))
+
+    return missing
+
+
+def _blocks(extent: Extent) -> list[Extent]:
+    """The blocks of the coarsest map, in its cells, that cover a rectangle of the root map's."""
+    side = CELLS * BLOCK
+    blocks = []
+    for i in range(extent.lower[0] // side, math.ceil(extent.upper[0] / side)):
+        for j in range(extent.lower[1] // side, math.ceil(extent.upper[1] / side)):
+            blocks.append(Extent((i * BLOCK, j * BLOCK), ((i + 1) * BLOCK, (j + 1) * BLOCK)))
+
+    return blocks
+
+
+def _around(agent: Self, graph: Graph, config: Config) -> Extent:
+    """The cells of the coarsest map around the agent."""
+    side_m = graph.cell_m(ROOT_MAP) * CELLS
+    low = np.floor((np.array([agent.x_m, agent.y_m]) - config.reach_m) / side_m)
+    high = np.ceil((np.array([agent.x_m, agent.y_m]) + config.reach_m) / side_m) + 1
+
+    first_i, first_j = low.astype(int).tolist()
+    last_i, last_j = high.astype(int).tolist()
+    return Extent((first_i, first_j), (last_i, last_j))
+
+
+def _update(graph: Graph, coarsest: Extent) -> list[Operation]:
+    """The cells that change on the levels whose coarsest one has these."""
+    extents = [coarsest]
+    for _ in range(LEVELS):
+        extents.insert(0, _finer(extents[0]))
+
+    window = graph.places.window(ROOT_MAP, COLUMNS, extents[0])
+    places = places_of(
+        window.column(PlaceColumn.ROAD), window.column(PlaceColumn.OBSTACLE), window.weights()
+    )
+    operations: list[Operation] = []
+    for level, extent in enumerate(extents[1:], start=1):
+        places = coarser(places)
+        operations += _changed(graph, coarse_map_id(level), extent, places)
+
+    return operations
+
+
+def _finer(extent: Extent) -> Extent:
+    """The finer cells, with a margin, of a rectangle of coarse ones."""
+    first = FACTOR // 2 + MARGIN
+    low_i, low_j = extent.lower
+    high_i, high_j = extent.upper
+    return Extent(
+        (FACTOR * low_i - first, FACTOR * low_j - first),
+        (FACTOR * high_i - FACTOR // 2 + MARGIN, FACTOR * high_j - FACTOR // 2 + MARGIN),
+    )
+
+
+def _changed(graph: Graph, map_id: str, extent: Extent, places: Places) -> list[Operation]:
+    """The cells of one coarse map that change."""
+    known = graph.places.window(map_id, COARSE, extent)
+    after = np.concatenate([places.road[None], places.is_open.astype(np.float32)])
+    return changed_cells(map_id, known, after)

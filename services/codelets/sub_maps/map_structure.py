@@ -1,0 +1,206 @@
+"""The map structure codelet: objects that belong together get a sub-map (paper §5.3).
+
+It runs beside the cycle. An object that arrives changes the sub-maps around it alone, so a task
+reads no more of the map than those.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from cogmap.geometry.arrays import Indices
+from cogmap.graph.graph import Graph
+from cogmap.graph.window import WEIGHT_COLUMNS
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import DropNode, DropPlaces, Links, Operation, Phase
+from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_id, object_id
+from cogmap.services.codelets.nodes import nodes_of
+from cogmap.services.codelets.sub_maps.config import SECTION, Config
+from cogmap.services.codelets.sub_maps.cut_links import CutLinks
+from cogmap.services.codelets.sub_maps.extents import extent_of, is_outdated, sub_map_node
+from cogmap.services.codelets.sub_maps.labels import NEW
+from cogmap.services.codelets.sub_maps.members import (
+    maps_around,
+    members_of,
+    next_number,
+    number_of,
+    positions_of,
+    sub_maps_of,
+)
+from cogmap.services.codelets.sub_maps.sub_maps import SubMaps
+
+MANY = 50
+MANY_SHARE = 0.25
+"""So many objects without a sub-map, and such a share of those with one, have all sorted anew."""
+
+
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+    """One task about the objects in view that are in no sub-map yet, and about one sub-map, another
+    in each cycle, where its objects are no longer where it says; about no node where so many
+    objects are in none that all are sorted anew.
+    """
+    maps = sub_maps_of(graph)
+    if _are_many_new(graph, maps):
+        return [context.task(CODELET.name)]
+
+    about = _new_in_view(context, graph, config)
+    if maps:
+        checked = maps[context.cycle % len(maps)]
+        if is_outdated(checked, members_of([checked], graph), config):
+            about.append(checked.id)
+
+    if not about:
+        return []
+    return [context.task(CODELET.name, about)]
+
+
+def run(task: Task, graph: Graph, config: Config) -> Answer:
+    """The sub-maps around what the task is about, and the links of their objects to them."""
+    scope = _scope(task, graph, config)
+    sorted_in = _sorted(scope, graph, config)
+
+    maps = _map_nodes(scope, sorted_in, graph, config)
+    links = _links(scope, sorted_in)
+    kept = set(sorted_in.tolist())
+    gone = [DropNode(id=node.id) for node in scope.maps if number_of(node) not in kept]
+    return Answer([*maps, *links, *gone])
+
+
+CODELET = Codelet(
+    name="map_structure",
+    phase=Phase.BACKGROUND,
+    due=due,
+    run=run,
+    reads=frozenset({Object, Map, LinkKind.WITHIN, *WEIGHT_COLUMNS}),
+    writes=frozenset({Map, LinkKind.WITHIN}),
+    config=Config,
+    section=SECTION,
+)
+
+
+class _Scope(NamedTuple):
+    """Sub-maps that may change, the objects in them, with those that arrive last, the number of the
+    sub-map of each, (n,), NEW of those that arrive, and whether all are sorted anew.
+    """
+
+    maps: list[Map]
+    objects: list[Object]
+    numbers: Indices
+    all_anew: bool
+
+
+def _are_many_new(graph: Graph, maps: list[Map]) -> bool:
+    """Whether to sort all objects anew."""
+    known = 0
+    for node in maps:
+        known += len(graph.links.sources(node.id, LinkKind.WITHIN))
+
+    new = graph.count(Object) - known
+    return new > max(MANY, MANY_SHARE * known)
+
+
+def _new_in_view(context: CycleContext, graph: Graph, config: Config) -> list[str]:
+    """The objects in view that are in no sub-map, and were seen often enough to be there."""
+    names = sorted(object_id(percept.label) for percept in context.percepts.objects)
+
+    new = []
+    for node in nodes_of(graph, Object, names):
+        is_sure = node.surveyed or node.sightings >= config.min_sightings
+        if is_sure and _is_new(node, graph):
+            new.append(node.id)
+
+    return new
+
+
+def _is_new(node: Object, graph: Graph) -> bool:
+    sub_map = graph.links.target(node.id, LinkKind.WITHIN)
+    is_in_none = sub_map is None or graph.get(Map, sub_map) is None
+    return node.map == ROOT_MAP and is_in_none
+
+
+def _scope(task: Task, graph: Graph, config: Config) -> _Scope:
+    """What a task is about, and what that may change."""
+    if task.about:
+        new = [node for node in nodes_of(graph, Object, task.about) if _is_new(node, graph)]
+        moved = nodes_of(graph, Map, task.about)
+        maps = maps_around(sub_maps_of(graph), new, moved, config.reach_m)
+    else:
+        new = [node for node in graph.of_kind(Object) if _is_new(node, graph)]
+        moved = []
+        maps = sub_maps_of(graph)
+
+    known = members_of(maps, graph)
+    numbers = [number for number, nodes in known.items() for _ in nodes]
+    objects = [node for nodes in known.values() for node in nodes]
+    return _Scope(
+        maps=maps,
+        objects=[*objects, *new],
+        numbers=np.array(numbers + [NEW] * len(new), np.int64),
+        all_anew=bool(moved) or not task.about,
+    )
+
+
+def _sorted(scope: _Scope, graph: Graph, config: Config) -> Indices:
+    """(n,): the number of the sub-map that each object is in now."""
+    if not scope.objects:
+        return np.zeros(0, np.int64)
+
+    positions_m = positions_of(scope.objects)
+    functions, kinds = _codes(scope.objects)
+    cell_m = graph.cell_m()
+    clear_m = np.array([node.width_m / 2 + cell_m for node in scope.objects])
+    boundaries = CutLinks.around(graph, positions_m)
+
+    first = len(positions_m) if scope.all_anew else int((scope.numbers != NEW).sum())
+    sub_maps = SubMaps(
+        positions_m[:first],
+        functions[:first],
+        boundaries,
+        config,
+        kinds=kinds,
+        clear_m=clear_m[:first],
+        labels=scope.numbers[:first],
+        next_label=next_number(graph),
+    )
+    if scope.all_anew:
+        sub_maps.settle()
+
+    for index in range(first, len(positions_m)):
+        sub_maps.add(positions_m[index], int(functions[index]), float(clear_m[index]))
+    return sub_maps.labels
+
+
+def _codes(objects: list[Object]) -> tuple[Indices, int]:
+    """(n,): the functions of objects as numbers, NEW where unknown, and how many there are."""
+    names = sorted({node.function for node in objects if node.function})
+    number = {name: code for code, name in enumerate(names)}
+    codes = [number.get(node.function, NEW) for node in objects]
+    return np.array(codes, np.int64), len(names)
+
+
+def _map_nodes(scope: _Scope, numbers: Indices, graph: Graph, config: Config) -> list[Operation]:
+    """The sub-maps that are new or cover another area than before, and so have another frame."""
+    positions_m = positions_of(scope.objects)
+    written: list[Operation] = []
+    for number in np.unique(numbers).tolist():
+        extent = extent_of(positions_m[numbers == number])
+        before = graph.get(Map, map_id(number))
+        if before is None or extent.differs_from(before, config.moved_m):
+            written.append(sub_map_node(number, extent, graph, config))
+            if before is not None:
+                written.append(DropPlaces(map=before.id))
+
+    return written
+
+
+def _links(scope: _Scope, numbers: Indices) -> list[Operation]:
+    """The links of the objects whose sub-map is another than before."""
+    weights = {}
+    changed = np.flatnonzero(numbers != scope.numbers)
+    for index in changed.tolist():
+        weights[scope.objects[index].id] = {map_id(int(numbers[index])): 1.0}
+
+    return [Links(kind=LinkKind.WITHIN, weights=weights)] if weights else []

@@ -1,0 +1,173 @@
+"""Objects and the sub-map of each: found for all at once, and kept as more arrive (paper §5.3)."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats, Indices
+from cogmap.services.codelets.sub_maps.config import Config
+from cogmap.services.codelets.sub_maps.labels import NEW, kept_labels
+from cogmap.services.codelets.sub_maps.mixture import (
+    SPACING_SQUARES,
+    SPACING_SUM,
+    Mixture,
+    Scene,
+    rows_of,
+)
+from cogmap.services.codelets.sub_maps.neighbourhood import Neighbourhood, Separation
+from cogmap.services.codelets.sub_maps.search import (
+    compact,
+    merge_clusters,
+    move_objects,
+    partition,
+    parts,
+)
+
+PARTING_GROWTH = 1.25
+REVIEW_GROWTH = 1.6
+MANY = 600
+MANY_TO_PART = 150
+MANY_REVIEW_GROWTH = REVIEW_GROWTH**2
+
+
+class SubMaps:
+    """Objects, and the labels of their sub-maps, (n,), which are kept as long as a sub-map exists.
+
+    Positions are (n, 2); functions (n,), from 0 to `kinds` - 1, or -1 where unknown; `boundaries`
+    are what separates objects. A boundary within `clear_m`, (n,), of an object is of the object
+    itself and separates nothing. Objects labelled NEW are in none yet.
+    """
+
+    def __init__(
+        self,
+        positions_m: Floats,
+        functions: Indices,
+        boundaries: Separation,
+        config: Config,
+        *,
+        kinds: int,
+        clear_m: Floats | None = None,
+        labels: Indices | None = None,
+        next_label: int = 0,
+    ) -> None:
+        count = len(positions_m)
+        self.labels = np.full(count, NEW) if labels is None else labels.copy()
+        self.next_label = max(next_label, int(self.labels.max(initial=NEW)) + 1)
+
+        self._mixture = Mixture(config)
+        self._kinds = kinds
+        self._centre_m = positions_m.mean(axis=0) if count else np.zeros(2)
+
+        own_m = np.zeros(count) if clear_m is None else clear_m
+        self._near = Neighbourhood(positions_m, own_m, boundaries, config.sub_map_sd_m)
+        self._rows = self._rows_of(positions_m, functions)
+        self._set_spacings()
+
+    def settle(self) -> None:
+        """Find the most probable partition of all objects, from the labels that they have; those
+        that are in no sub-map begin alone.
+        """
+        start = self.labels.copy()
+        is_new = start == NEW
+        start[is_new] = self.next_label + np.arange(is_new.sum())
+
+        everyone = np.arange(len(start))
+        found = partition(self._mixture, self._scene(everyone), start)
+        self._relabel(everyone, found)
+
+    def add(self, position_m: Floats, function: int = -1, clear_m: float = 0.0) -> int:
+        """The label of one more object, at (2,). Sub-maps near it may merge, part or exchange
+        objects.
+        """
+        near = self._append(position_m, function, clear_m)
+        is_member = np.isin(self.labels, np.unique(self.labels[near])) & (self.labels != NEW)
+        is_member[-1] = True
+        members = np.flatnonzero(is_member)
+
+        scene = self._scene(members)
+        labels = self.labels[members]
+        labels[-1] = self.next_label
+        merged = merge_clusters(self._mixture, scene, compact(labels))
+        moved = move_objects(self._mixture, scene, merged)
+        self._relabel(members, moved)
+
+        self._follow_growth(int(self.labels[-1]))
+        return int(self.labels[-1])
+
+    def _follow_growth(self, label: int) -> None:
+        """Sort anew, or part, a sub-map that has grown by its last object: the more seldom the
+        larger it is, so that this costs little for each object.
+        """
+        size = int((self.labels == label).sum())
+        if _has_grown(size, REVIEW_GROWTH):
+            members = self._around(label)
+            if len(members) <= MANY or _has_grown(size, MANY_REVIEW_GROWTH):
+                self._review(members)
+                return
+
+        if size <= MANY_TO_PART and _has_grown(size, PARTING_GROWTH):
+            self._part(label)
+
+    def _part(self, label: int) -> None:
+        """Part a sub-map where that is more probable."""
+        members = np.flatnonzero(self.labels == label)
+        self._relabel(members, parts(self._mixture, self._scene(members)))
+
+    def _around(self, label: int) -> Indices:
+        """(m,): the objects of a sub-map and of those that neighbour it."""
+        is_own = self.labels == label
+        edges = self._near.edges
+        beside = edges[is_own[edges[:, 0]] | is_own[edges[:, 1]]]
+        labels = np.unique(self.labels[beside])
+        return np.flatnonzero(np.isin(self.labels, labels) | is_own)
+
+    def _review(self, members: Indices) -> None:
+        """Sort some objects, (m,), anew, from the labels that they have."""
+        found = partition(self._mixture, self._scene(members), self.labels[members])
+        self._relabel(members, found)
+
+    def _relabel(self, members: Indices, clusters: Indices) -> None:
+        """Give the clusters of some objects, (m,), the labels that they had, where they had any."""
+        labels = kept_labels(self.labels[members], clusters, self.next_label)
+        self.labels[members] = labels
+        self.next_label = max(self.next_label, int(labels.max(initial=NEW)) + 1)
+
+    def _append(self, position_m: Floats, function: int, clear_m: float) -> Indices:
+        """Add an object that is in no sub-map; its neighbours."""
+        near = self._near.append(position_m, clear_m)
+        row = self._rows_of(position_m[None], np.array([function]))
+        self._rows = np.vstack([self._rows, row])
+        self._set_spacings()
+
+        self.labels = np.append(self.labels, NEW)
+        return near
+
+    def _rows_of(self, positions_m: Floats, functions: Indices) -> Floats:
+        return rows_of(positions_m - self._centre_m, functions, self._kinds)
+
+    def _set_spacings(self) -> None:
+        spacings = self._near.spacings
+        self._rows[:, SPACING_SUM] = spacings
+        self._rows[:, SPACING_SQUARES] = spacings**2
+
+    def _scene(self, members: Indices) -> Scene:
+        """What is to be clustered of some objects, (m,)."""
+        count = len(self._rows)
+        number = np.full(count, -1)
+        number[members] = np.arange(len(members))
+
+        is_inside = self._near.inside(number >= 0)
+        crossed = self._near.is_crossed[is_inside]
+        bonds = self._mixture.bonds(crossed, self._near.gaps(is_inside))
+        return Scene(self._rows[members], number[self._near.edges[is_inside]], bonds)
+
+
+def _has_grown(size: int, growth: float) -> bool:
+    """Whether the last of so many objects completes another growth by a factor, since the first."""
+    if size < 2:
+        return False
+
+    step = math.log(growth)
+    return math.floor(math.log(size) / step) > math.floor(math.log(size - 1) / step)
