@@ -118,18 +118,6 @@ def mean_pose(poses: Floats) -> Floats:
     return mean
 
 
-def motion_onto(points_m: Floats, others_m: Floats) -> Floats:
-    """(3,): the pose that moves (k, 2) points onto others with the least squares (Umeyama 1991)."""
-    middle_m = points_m.mean(axis=0)
-    other_middle_m = others_m.mean(axis=0)
-    x, y = (points_m - middle_m).T
-    u, v = (others_m - other_middle_m).T
-
-    turn_rad = np.arctan2((x * v - y * u).sum(), (x * u + y * v).sum())
-    shift_m = other_middle_m - rotate(middle_m, turn_rad)
-    return np.array([*shift_m, turn_rad])
-
-
 def cumulative(values: Floats) -> Floats:
     """(n + 1, ...): sums of the first 0, 1, ... n of (n, ...) values."""
     zero = np.zeros((1, *values.shape[1:]))
