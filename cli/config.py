@@ -154,6 +154,20 @@ def _array_of_tables(path: list[str], tables: list[dict[str, Any]]) -> list[str]
 
 def _comment(schema: Schema) -> list[str]:
     description = schema.get("description", "")
+    bounds = _range(schema)
+    if bounds and bounds not in description:
+        description = f"{description} ({bounds})"
     return textwrap.wrap(
         description, COLUMNS, initial_indent="# ", subsequent_indent="# ", break_long_words=False
     )
+
+
+def _range(schema: Schema) -> str:
+    """The range of a number in words, such as "above 0 to 1"; empty for what has none."""
+    lowest = schema.get("minimum", schema.get("exclusiveMinimum"))
+    highest = schema.get("maximum", schema.get("exclusiveMaximum"))
+    if lowest is None or highest is None:
+        return ""
+
+    words = f"{lowest:g} to {highest:g}".replace("e+0", "e").replace("e+", "e")
+    return words if "minimum" in schema else f"above {words}"

@@ -13,6 +13,7 @@ from cogmap.schemas.cognition import (
     Rejection,
     Trigger,
 )
+from cogmap.services.global_workspace.config import TICK_MS
 
 OUT_OF_IT = frozenset({Fate.DISPLACED, Fate.DECAYED})
 
@@ -117,7 +118,7 @@ def why_now(moment: Moment, competition: Competition) -> str:
         case Trigger.AGGREGATE:
             figures = f", {sum(activations):.2f} over {settings.aggregate_above:.2f}"
         case Trigger.NO_BROADCAST if silent_s is not None:
-            limit_s = settings.no_broadcast_ticks * settings.tick_ms / 1e3
+            limit_s = settings.no_broadcast_ticks * TICK_MS / 1e3
             figures = f", {silent_s:.2f} s where {limit_s:.2f} s suffice"
     return f"The broadcast was triggered by: {competition.trigger.value}{figures}."
 
@@ -133,7 +134,7 @@ def why_none(moment: Moment, competition: Competition) -> str:
 
     settings = moment.settings
     silent_s = _silent_s(moment)
-    refractory_s = settings.refractory_ticks * settings.tick_ms / 1e3
+    refractory_s = settings.refractory_ticks * TICK_MS / 1e3
     if silent_s is not None and silent_s < refractory_s:
         return (
             f"It triggered no broadcast, being refractory: the last was {silent_s:.2f} s before, "
@@ -147,7 +148,7 @@ def why_none(moment: Moment, competition: Competition) -> str:
         f"{settings.aggregate_above:.2f}",
     ]
     if silent_s is not None:
-        limit_s = settings.no_broadcast_ticks * settings.tick_ms / 1e3
+        limit_s = settings.no_broadcast_ticks * TICK_MS / 1e3
         needs.append(f"the last broadcast was {silent_s:.2f} s before, short of {limit_s:.2f} s")
     return f"It triggered no broadcast: {'; '.join(needs)}."
 
