@@ -40,7 +40,7 @@ HOME = Goal(id=goal_id("home"))
 HOME_AFTER = 1.5
 """How many times as long as it explored an agent may take to its goals."""
 LAP_S = 300.0
-LAP_UNKNOWN_WEIGHT = 0.5
+LAP_UNKNOWN_COST = 2.0
 """A lap leads along unknown streets too, though known ones may lead to the same corner."""
 
 
@@ -154,7 +154,7 @@ def _give_goals(sections: Sections, choices: Choices) -> None:
             {"name": name, "x_m": x_m, "y_m": y_m} for name, (x_m, y_m) in [*places, ("end", end)]
         ]
         workspace["in_order"] = True
-        sections["planning"].setdefault("unknown_weight", LAP_UNKNOWN_WEIGHT)
+        sections["planning"].setdefault("unknown_cost", LAP_UNKNOWN_COST)
         sim.setdefault("duration_s", max(SimConfig().duration_s, LAP_S * laps))
 
     if workspace.get("goals"):
