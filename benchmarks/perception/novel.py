@@ -9,9 +9,7 @@ from dataclasses import dataclass, field
 from benchmarks.perception.objects import Sight
 from benchmarks.perception.scenes import MIN_TURN_RAD, other_distance
 from cogmap.geometry.arrays import Floats
-from cogmap.services.workspace.config import Config
-
-RECOGNISED = Config().recognition_threshold
+from cogmap.services.workspace.ingress import RECOGNITION_THRESHOLD
 
 
 @dataclass(frozen=True)
@@ -60,9 +58,9 @@ def remembered(
 
     Each was to be met in the encounter of its number. Sides and distances are other than in that
     one, and in every other encounter that it was seen in. Its name is the first that it was
-    recognised by, with an activation over RECOGNISED. A building that they gave no name, or that of
-    a trained class or of another building, has none: no later sighting of it is right. Of later
-    sightings all count, however low their activation.
+    recognised by, with an activation over RECOGNITION_THRESHOLD. A building that they gave no
+    name, or that of a trained class or of another building, has none: no later sighting of it is
+    right. Of later sightings all count, however low their activation.
     """
     tally = _Tally(trained)
 
@@ -94,7 +92,7 @@ class _Tally:
         for number, label, activation in _sightings(meeting):
             self.places[number].append(meeting.from_where[number])
 
-            if number in self.names or activation <= RECOGNISED:
+            if number in self.names or activation <= RECOGNITION_THRESHOLD:
                 continue
 
             is_taken = label in self.names.values()
