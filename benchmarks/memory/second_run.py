@@ -164,10 +164,10 @@ def sections(chosen: Visit) -> Sections:
 
 
 def measure(processes: int) -> Metrics:
-    """How far is driven before the map of the first run is recalled and right, over the first run's
-    way; and how often one of the other towns' maps is recalled instead.
+    """Return the distance driven before the map of the first run is recalled and right, over the
+    first run's; and how often one of the other towns' maps is recalled instead.
 
-    A town whose map is not recalled, or wrongly, counts with the whole way of the second run.
+    A town whose map is not recalled, or wrongly, counts with the whole second run.
     """
     seeds = list(range(FIRST_SEED, FIRST_SEED + TOWNS))
     learning = [Visit(seed, FIRST_START, (), LEARN_S) for seed in seeds]
