@@ -7,8 +7,10 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from cogmap.geometry.arrays import Bytes, Floats, Singles
+from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
 from cogmap.services.epam.layout.road import HEIGHT_PX, WIDTH_PX
+
+SIZE_PX = (WIDTH_PX, HEIGHT_PX)
 
 
 @dataclass(frozen=True)
@@ -50,6 +52,19 @@ class LabelledImage:
     road: Bytes
     known: Bytes
 
+    @classmethod
+    def of(
+        cls, image: Bytes, road: Booleans, known: Booleans, size_px: tuple[int, int] = SIZE_PX
+    ) -> LabelledImage:
+        """Return `image` with masks of the pixels (h, w) that show road, and of those for which
+        that is known, at `size_px`: columns, rows.
+        """
+        small = []
+        for values in (image, 255 * road.astype(np.uint8), 255 * known.astype(np.uint8)):
+            resized = cv2.resize(values, size_px, interpolation=cv2.INTER_AREA)
+            small.append(resized.astype(np.uint8, copy=False))
+        return cls(*small)
+
 
 def augmented(
     labelled: LabelledImage, how: Augmentation, rng: np.random.Generator
@@ -58,18 +73,10 @@ def augmented(
     if how.slope:
         labelled = _sloped(labelled, how.slope, rng)
 
-    original_size = labelled.image.shape[:2]
-    matrix = _affine(original_size, how, rng)
-    size = (WIDTH_PX, HEIGHT_PX)
-    image = cv2.warpAffine(
-        labelled.image,
-        matrix,
-        size,
-        flags=cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
-    road = cv2.warpAffine(labelled.road, matrix, size, flags=cv2.INTER_LINEAR)
-    known = cv2.warpAffine(labelled.known, matrix, size, flags=cv2.INTER_LINEAR)
+    matrix = _affine(labelled.image.shape[:2], how, rng)
+    image = cv2.warpAffine(labelled.image, matrix, SIZE_PX, borderMode=cv2.BORDER_REPLICATE)
+    road = cv2.warpAffine(labelled.road, matrix, SIZE_PX)
+    known = cv2.warpAffine(labelled.known, matrix, SIZE_PX)
 
     relit = _relit(image.astype(np.float32), how, rng)
     return LabelledImage(
@@ -77,21 +84,6 @@ def augmented(
         road=road.astype(np.uint8),
         known=known.astype(np.uint8),
     )
-
-
-def resized(labelled: LabelledImage) -> LabelledImage:
-    """Return `labelled` unchanged but for its size, HEIGHT_PX by WIDTH_PX."""
-    return LabelledImage(
-        image=_resized(labelled.image),
-        road=_resized(labelled.road),
-        known=_resized(labelled.known),
-    )
-
-
-def _resized(image: Bytes) -> Bytes:
-    size = (WIDTH_PX, HEIGHT_PX)
-    small = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    return small.astype(np.uint8, copy=False)
 
 
 def _sloped(labelled: LabelledImage, slope: float, rng: np.random.Generator) -> LabelledImage:
@@ -114,46 +106,30 @@ def _sloped(labelled: LabelledImage, slope: float, rng: np.random.Generator) -> 
 
 
 def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) -> Floats:
-    """The affine map, (2, 3), from pixels of an image of `size` (h, w) to those of its variation,
-    perhaps mirrored.
+    """The affine map, (2, 3), from pixels of an image of `size` (h, w) to those of its variation:
+    zoomed, turned, shifted and perhaps mirrored.
     """
-    height, width = size
-    linear = _linear(size, how, rng)
-    shift = rng.uniform(-how.shift, how.shift, 2)
-    shift_px = shift * (WIDTH_PX, HEIGHT_PX)
-
-    centre_px = _centre_px(width, height)
-    new_centre_px = _centre_px(WIDTH_PX, HEIGHT_PX)
-    mapped_px = linear @ centre_px
-
-    translation_px = new_centre_px + shift_px - mapped_px
-    return np.column_stack([linear, translation_px])
-
-
-def _linear(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) -> Floats:
-    """The linear part (2, 2) of that map: zoom, turn and mirror."""
-    log_zoom = rng.uniform(*np.log(how.zoom))
-    zoom = np.exp(log_zoom)
-    turn_deg = rng.uniform(-how.turn_deg, how.turn_deg)
-    turn_rad = np.radians(turn_deg)
+    zoom = np.exp(rng.uniform(*np.log(how.zoom)))
+    turn_rad = np.radians(rng.uniform(-how.turn_deg, how.turn_deg))
     mirror = rng.choice((-1.0, 1.0))
 
     height, width = size
     across = zoom * WIDTH_PX / width
     down = zoom * HEIGHT_PX / height
-
     cos = np.cos(turn_rad)
     sin = np.sin(turn_rad)
+    linear = np.array(
+        [
+            [mirror * across * cos, -down * sin],
+            [mirror * across * sin, down * cos],
+        ]
+    )
 
-    top_row = [mirror * across * cos, -down * sin]
-    bottom_row = [mirror * across * sin, down * cos]
-    return np.array([top_row, bottom_row])
-
-
-def _centre_px(width: int, height: int) -> Floats:
-    """The column and row (2,) in the middle of an image of this size."""
-    last_px = np.array([width - 1, height - 1])
-    return np.asarray(last_px / 2)
+    # About the middle of the image.
+    shift_px = rng.uniform(-how.shift, how.shift, 2) * SIZE_PX
+    middle_px = np.array([width - 1, height - 1]) / 2
+    new_middle_px = np.array([WIDTH_PX - 1, HEIGHT_PX - 1]) / 2
+    return np.column_stack([linear, new_middle_px + shift_px - linear @ middle_px])
 
 
 def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes:
@@ -163,7 +139,9 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
         image = blurred.astype(np.float32, copy=False)
 
     if how.saturation:
-        image = _saturated(image, rng.uniform(-how.saturation, how.saturation))
+        grey = image.mean(axis=2, keepdims=True)
+        added = np.float32(rng.uniform(-how.saturation, how.saturation))
+        image = np.asarray(image + (image - grey) * added, np.float32)
 
     if how.backlit_share and rng.random() < how.backlit_share:
         image *= _backlight(rng)
@@ -171,23 +149,19 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
     if rng.random() < how.shadow_share:
         image *= _shadow(rng)
 
+    # The camera's response: the new level of each of 256 levels in each colour.
+    contrast = rng.uniform(-how.contrast, how.contrast)
+    gain = np.exp(contrast + rng.uniform(-how.cast, how.cast, 3))
+    gamma = np.exp(rng.uniform(-how.gamma, how.gamma))
+    offset = rng.uniform(-how.brightness, how.brightness)
+    curve = 255 * (np.arange(256) / 255) ** gamma
+    response = np.asarray(curve[:, None] * gain + offset, np.float32)
     levels = np.clip(image, 0, 255).astype(np.uint8)
-    response = _response(how, rng)
     image = response[levels, np.arange(3)]
 
     noise = rng.standard_normal(image.shape, np.float32)
-    noise_sd = np.float32(rng.uniform(0, how.noise))
-    image += noise * noise_sd
-
-    limited = np.clip(image, 0, 255)
-    return limited.astype(np.uint8)
-
-
-def _saturated(image: Singles, added: float) -> Singles:
-    """`image` with this share of its colour `added`, or taken where it is below 0."""
-    grey = image.mean(axis=2, keepdims=True)
-    saturated = image + (image - grey) * np.float32(added)
-    return np.asarray(saturated, np.float32)
+    image += noise * np.float32(rng.uniform(0, how.noise))
+    return np.clip(image, 0, 255).astype(np.uint8)
 
 
 def _backlight(rng: np.random.Generator) -> Singles:
@@ -204,47 +178,18 @@ def _backlight(rng: np.random.Generator) -> Singles:
     return np.asarray(light, np.float32)[:, None, None]
 
 
-def _response(how: Augmentation, rng: np.random.Generator) -> Singles:
-    """A camera's response: the new level of each of 256 levels in each colour, (256, 3)."""
-    contrast = rng.uniform(-how.contrast, how.contrast)
-    cast = rng.uniform(-how.cast, how.cast, 3)
-    gain = np.exp(contrast + cast)
-
-    log_gamma = rng.uniform(-how.gamma, how.gamma)
-    gamma = np.exp(log_gamma)
-    offset = rng.uniform(-how.brightness, how.brightness)
-
-    share = np.arange(256) / 255
-    curve = 255 * share**gamma
-
-    response = curve[:, None] * gain + offset
-    return np.asarray(response, np.float32)
-
-
 def _shadow(rng: np.random.Generator) -> Singles:
-    """The share of light that is left, (HEIGHT_PX, WIDTH_PX, 1), by a shadow in a straight band."""
-    across_px = _across_px(rng.uniform(0, np.pi))
+    """The share of light that remains, (HEIGHT_PX, WIDTH_PX, 1), in a shadow in a straight band."""
+    rows, columns = np.indices((HEIGHT_PX, WIDTH_PX), dtype=np.float32, sparse=True)
+    direction_rad = rng.uniform(0, np.pi)
+    right_px = np.cos(direction_rad) * (columns - WIDTH_PX / 2)
+    across_px = right_px + np.sin(direction_rad) * (rows - HEIGHT_PX / 2)
+
     middle_px = rng.uniform(-80, 80)
     half_px = rng.uniform(5, 60)
     edge_px = rng.uniform(0.5, 4.0)
-
-    from_middle_px = np.abs(across_px - middle_px)
-    inside_px = half_px - from_middle_px
+    inside_px = half_px - np.abs(across_px - middle_px)
     shade = np.clip(inside_px / edge_px + 0.5, 0, 1)
 
-    darkness = rng.uniform(0.2, 0.65)
-    light = 1 - darkness * shade
+    light = 1 - rng.uniform(0.2, 0.65) * shade
     return np.asarray(light, np.float32)[..., None]
-
-
-def _across_px(direction_rad: float) -> Floats:
-    """How far each pixel (HEIGHT_PX, WIDTH_PX) lies from the middle in that direction."""
-    rows, columns = np.indices((HEIGHT_PX, WIDTH_PX), dtype=np.float32, sparse=True)
-    right_px = columns - WIDTH_PX / 2
-    down_px = rows - HEIGHT_PX / 2
-
-    cos = np.cos(direction_rad)
-    sin = np.sin(direction_rad)
-
-    across_px: Floats = cos * right_px + sin * down_px
-    return across_px

@@ -5,10 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-import cv2
-import numpy as np
-
-from cogmap.geometry.arrays import Booleans, Bytes
 from cogmap.services.epam.layout.road import CHANNELS
 from cogmap.training.augment import Augmentation, LabelledImage
 from cogmap.training.networks.photograph import COLOURS, PhotographNet
@@ -57,8 +53,11 @@ def train_on(
     epochs: int | None = None,
     images: int | None = None,
 ) -> None:
-    """Train on photographs that were read, otherwise like `train_on_photographs`."""
-    known = [_labelled(photograph) for photograph in shown]
+    """Train on photographs that were read, else as `train_on_photographs` does."""
+    known = [
+        LabelledImage.of(photograph.image, photograph.road, photograph.known, SIZE_PX)
+        for photograph in shown
+    ]
 
     schedule = Schedule(
         epochs=epochs or EPOCHS,
@@ -68,20 +67,3 @@ def train_on(
     )
     net = train(known, schedule, lambda: PhotographNet(CHANNELS - COLOURS, WIDTHS))
     write(net, out)
-
-
-def _labelled(photograph: Photograph) -> LabelledImage:
-    return LabelledImage(
-        image=_resized(photograph.image),
-        road=_resized(_levels(photograph.road)),
-        known=_resized(_levels(photograph.known)),
-    )
-
-
-def _levels(mask: Booleans) -> Bytes:
-    return mask.astype(np.uint8) * 255
-
-
-def _resized(image: Bytes) -> Bytes:
-    resized = cv2.resize(image, SIZE_PX, interpolation=cv2.INTER_AREA)
-    return resized.astype(np.uint8, copy=False)

@@ -37,6 +37,8 @@ class Crops:
 
 
 class _Row(NamedTuple):
+    """One of Crops."""
+
     values: npt.NDArray[np.float16]
     name: str
     whole: bool
@@ -48,14 +50,10 @@ def overlap(segment: Segment, label: Bytes) -> tuple[int, float]:
     """Return the number of the building in `label` (h, w) that most of `segment` shows, and the
     intersection over union of the two.
     """
-    number, common_px = _main_building(segment, label)
-    is_building = label == number
-    building_px = int(np.count_nonzero(is_building))
-
-    both_px = segment.area_px + building_px
-    union_px = both_px - common_px
-    share = common_px / max(union_px, 1)
-    return number, share
+    number, common_px = main_building(segment, label)
+    building_px = int(np.count_nonzero(label == number))
+    union_px = segment.area_px + building_px - common_px
+    return number, common_px / max(union_px, 1)
 
 
 def crops(towns: Iterable[Town], segmenter: Segmenter) -> Crops:
@@ -84,30 +82,23 @@ def _of_town(index: int, town: Town, segmenter: Segmenter) -> Iterator[_Row]:
 
         for segment in segmenter.segments(image, depth_m, camera):
             values = crop(image, depth_m, segment, around, camera.fx_px)
+            building, common_px = main_building(segment, label)
+            is_pure = common_px >= MIN_PURITY * segment.area_px
             _, share = overlap(segment, label)
             yield _Row(
                 values=values.astype(np.float16),
-                name=_shown(segment, label, town.names),
+                name=town.names[building - 1] if is_pure else "",
                 whole=share >= MIN_OVERLAP,
                 view=VIEWS_A_TOWN * index + number,
                 area_px=segment.area_px,
             )
 
 
-def _shown(segment: Segment, label: Bytes, names: tuple[str, ...]) -> str:
-    """The name of the building that at least MIN_PURITY of the segment shows, empty for none."""
-    number, common_px = _main_building(segment, label)
-    if common_px < MIN_PURITY * segment.area_px:
-        return ""
-    return names[number - 1]
-
-
-def _main_building(segment: Segment, label: Bytes) -> tuple[int, int]:
-    """The building that most pixels of `segment` show, and how many do; 0 pixels if none does."""
-    labels = label[segment.mask]
-    count = np.bincount(labels, minlength=2)
+def main_building(segment: Segment, label: Bytes) -> tuple[int, int]:
+    """Return the number in `label` (h, w) of the building that most pixels of `segment` show, and
+    how many do; 0 pixels if none does.
+    """
+    count = np.bincount(label[segment.mask], minlength=2)
     count[0] = 0
-
     number = int(count.argmax())
-    common_px = int(count[number])
-    return number, common_px
+    return number, int(count[number])

@@ -104,86 +104,44 @@ def augmented(values: npt.NDArray[np.float16], rng: np.random.Generator) -> Sing
     never mirrored: a building's mirror image is another building.
     """
     varied = values.astype(np.float32)
-    _relight(varied, rng)
-    _hide_parts(varied, rng)
-    _remove_details(varied, rng)
+    count = len(varied)
 
-    shifts = rng.integers(-3, 4, (len(varied), 2))
-    for crop, shift in zip(varied, shifts, strict=True):
-        shown = crop[:5]
-        shown[:] = np.roll(shown, shift, axis=(1, 2))
-
-    return varied
-
-
-def _relight(values: Singles, rng: np.random.Generator) -> None:
-    """Change the colours of segment, ground and sky alike, and the size a little, in place."""
-    gain, offset = _lights(len(values), rng)
-    _relight_segments(values, gain, offset)
-    _relight_surroundings(values, gain, offset)
-
-    log_size = rng.normal(0, 0.04, (len(values), 1, 1))
-    values[:, 5] += log_size.astype(np.float32)
-
-
-def _lights(count: int, rng: np.random.Generator) -> tuple[Singles, Singles]:
-    """The factor (count, 3, 1, 1) on colours, and what is added to them (count, 1, 1, 1)."""
+    # Another light changes the colours of segment, ground and sky alike; outside of the segment,
+    # and for ground or sky that is not in view, they stay 0. The size changes a little.
     channel_gain = rng.normal(0, 0.06, (count, 3, 1, 1))
     overall_gain = rng.normal(0, 0.15, (count, 1, 1, 1))
-    gain = np.exp(channel_gain + overall_gain)
+    gain = np.exp(channel_gain + overall_gain).astype(np.float32)
+    offset = rng.normal(0, 0.06, (count, 1, 1, 1)).astype(np.float32)
 
-    offset = rng.normal(0, 0.06, (count, 1, 1, 1))
-    return gain.astype(np.float32), offset.astype(np.float32)
+    mask = varied[:, 3:4]
+    colours = varied[:, :3]
+    relit = (colours + 2 * mask) * gain - 2 * mask
+    colours[:] = relit + offset * mask
 
+    around = varied[:, 6:].reshape(count, 2, 3, SIDE_PX, SIDE_PX)
+    visible = np.abs(around).max(axis=2, keepdims=True) > 0
+    relit_around = (around + 2) * gain[:, None] - 2 + offset[:, None]
+    around[:] = np.where(visible, relit_around, 0)
+    varied[:, 5] += rng.normal(0, 0.04, (count, 1, 1)).astype(np.float32)
 
-def _relight_segments(values: Singles, gain: Singles, offset: Singles) -> None:
-    """Change the colours of the segments, in place; outside of them they stay 0."""
-    mask = values[:, 3:4]
-    colours = values[:, :3]
-    black = 2 * mask
-
-    light = colours + black
-    relit = light * gain - black
-    added = offset * mask
-    colours[:] = relit + added
-
-
-def _relight_surroundings(values: Singles, gain: Singles, offset: Singles) -> None:
-    """Change the colours of ground and sky, in place; where there is none they stay 0."""
-    around = values[:, 6:].reshape(len(values), 2, 3, SIDE_PX, SIDE_PX)
-    brightest = np.abs(around).max(axis=2, keepdims=True)
-    visible = brightest > 0
-
-    light = around + 2
-    brighter = light * gain[:, None]
-    relit = brighter - 2 + offset[:, None]
-    around[:] = np.where(visible, relit, 0)
-
-
-def _hide_parts(values: Singles, rng: np.random.Generator) -> None:
-    """Remove a rectangle from some of the segments, in place."""
-    is_hidden = rng.random(len(values)) < HIDDEN_SHARE
-
-    for number in np.flatnonzero(is_hidden):
+    # A rectangle of some is hidden.
+    for number in np.flatnonzero(rng.random(count) < HIDDEN_SHARE):
         left, top = rng.integers(0, SIDE_PX, 2)
         width, height = rng.integers(4, SIDE_PX // 2, 2)
+        varied[number, :4, top : top + height, left : left + width] = 0.0
 
-        rows = slice(top, top + height)
-        columns = slice(left, left + width)
-        values[number, :4, rows, columns] = 0.0
-
-
-def _remove_details(values: Singles, rng: np.random.Generator) -> None:
-    """Show some of the segments with the details of a smaller image, as from farther away, in
-    place.
-    """
-    is_far = rng.random(len(values)) < FAR_SHARE
-
-    for number in np.flatnonzero(is_far):
+    # Some have the details of a smaller image, as from farther away.
+    for number in np.flatnonzero(rng.random(count) < FAR_SHARE):
         side_px = int(rng.integers(MIN_SIDE_PX, SIDE_PX))
-        for channel in values[number, :5]:
+        for channel in varied[number, :5]:
             small = cv2.resize(channel, (side_px, side_px), interpolation=cv2.INTER_AREA)
             channel[:] = cv2.resize(small, (SIDE_PX, SIDE_PX), interpolation=cv2.INTER_LINEAR)
+
+    shifts = rng.integers(-3, 4, (count, 2))
+    for crop, shift in zip(varied, shifts, strict=True):
+        crop[:5] = np.roll(crop[:5], shift, axis=(1, 2))
+
+    return varied
 
 
 def train_on_renderings(
@@ -207,18 +165,11 @@ def train_on_renderings(
 
     export(fitted.net, out, "seen", INPUT_SHAPE, OUTPUT_SHAPES)
     embeddings, log_odds = embed(fitted.net, held_out)
-    uncalibrated = _uncalibrated(folder, fitted)
-    found = calibrate(embeddings, log_odds, held_out, uncalibrated)
+    found = calibrate(embeddings, log_odds, held_out, _uncalibrated(folder, fitted))
 
-    beside = out.with_suffix(".json")
-    _write(found.prototypes, beside)
+    encoded = msgspec.json.format(msgspec.json.encode(found.prototypes), indent=1)
+    out.with_suffix(".json").write_bytes(encoded + b"\n")
     return found.metrics
-
-
-def _write(prototypes: Prototypes, path: Path) -> None:
-    encoded = msgspec.json.encode(prototypes)
-    indented = msgspec.json.format(encoded, indent=1)
-    path.write_bytes(indented + b"\n")
 
 
 def _crops(paths: list[Path], progress: Progress) -> Crops:
@@ -246,12 +197,11 @@ def _uncalibrated(folder: Path, fitted: Fitted) -> Prototypes:
 
 def _fit(known: Crops, rng: np.random.Generator, epochs: int, progress: Progress) -> Fitted:
     names = sorted(set(known.name.tolist()) - {""})
-    number = _numbers(known, names)
+    number = np.where(known.name == "", -1, np.searchsorted(names, known.name))
 
     net = EmbeddingNet().to(memory_format=torch.channels_last)
     # Short ones turn fast at first: each of thousands of kinds is seldom seen.
-    initial = INITIAL_LENGTH * torch.randn(len(names), DIMENSIONS)
-    directions = nn.Parameter(initial)
+    directions = nn.Parameter(INITIAL_LENGTH * torch.randn(len(names), DIMENSIONS))
 
     steps = max(1, epochs * len(number) // BATCH)
     parameters = [*net.parameters(), directions]
@@ -272,13 +222,6 @@ def _fit(known: Crops, rng: np.random.Generator, epochs: int, progress: Progress
     return Fitted(net.eval(), directions, names)
 
 
-def _numbers(known: Crops, names: list[str]) -> npt.NDArray[np.intp]:
-    """The row (n,) in sorted `names` of what each crop shows, -1 for no building."""
-    rows = np.searchsorted(names, known.name)
-    is_nameless = known.name == ""
-    return np.where(is_nameless, -1, rows)
-
-
 def loss(
     embedding: Tensor, log_odds: Tensor, directions: Tensor, wanted: Tensor, whole: Tensor
 ) -> Tensor:
@@ -289,26 +232,18 @@ def loss(
     cosines = embedding[building] @ directions.T
 
     labels = wanted[building]
-    is_wanted = functional.one_hot(labels, len(directions))
-    margin = MARGIN * is_wanted
-    scores = SHARPNESS * (cosines - margin)
-    of_labels = functional.cross_entropy(scores, labels)
+    margin = MARGIN * functional.one_hot(labels, len(directions))
+    of_labels = functional.cross_entropy(SHARPNESS * (cosines - margin), labels)
 
     shown = torch.stack([building, whole], 1).float()
-    of_odds = functional.binary_cross_entropy_with_logits(log_odds, shown)
-
-    return of_labels + of_odds
+    return of_labels + functional.binary_cross_entropy_with_logits(log_odds, shown)
 
 
 def _batches(
     known: Crops, number: npt.NDArray[np.intp], steps: int, rng: np.random.Generator
 ) -> Iterator[Batch]:
     for chosen in shuffled(len(number), BATCH, steps, rng):
-        values = augmented(known.values[chosen], rng)
-        wanted = number[chosen]
-        whole = known.whole[chosen]
-
-        yield values, wanted, whole
+        yield augmented(known.values[chosen], rng), number[chosen], known.whole[chosen]
 
 
 def embed(net: EmbeddingNet, of: Crops) -> tuple[Singles, Singles]:
@@ -318,18 +253,12 @@ def embed(net: EmbeddingNet, of: Crops) -> tuple[Singles, Singles]:
     parts = len(of.values) // EMBEDDED_AT_ONCE + 1
     with torch.no_grad():
         for part in np.array_split(of.values, parts):
-            inputs = part.astype(np.float32)
-            values = torch.from_numpy(inputs)
-            embedding, odds = net(values)
+            embedding, odds = net(torch.from_numpy(part.astype(np.float32)))
             embeddings.append(embedding)
             log_odds.append(odds)
 
-    return _array(embeddings), _array(log_odds)
-
-
-def _array(parts: list[Tensor]) -> Singles:
-    joined = torch.cat(parts)
-    return joined.numpy().astype(np.float32)
+    joined_embeddings, joined_odds = torch.cat(embeddings), torch.cat(log_odds)
+    return joined_embeddings.numpy().astype(np.float32), joined_odds.numpy().astype(np.float32)
 
 
 def sizes_m(folder: Path, names: list[str]) -> dict[str, tuple[float, float, float]]:
@@ -339,13 +268,10 @@ def sizes_m(folder: Path, names: list[str]) -> dict[str, tuple[float, float, flo
     found: dict[str, tuple[float, float, float]] = {}
     for path in files(folder, "train"):
         town = read(path)
-        buildings = zip(town.names, town.size_m.tolist(), strict=True)
-        for name, size_m in buildings:
-            if name not in names:
-                continue
-            *sides_m, height_m = size_m
-            longer_m = max(sides_m)
-            shorter_m = min(sides_m)
-            found[name] = (longer_m, shorter_m, height_m)
+        for name, (width_m, depth_m, height_m) in zip(
+            town.names, town.size_m.tolist(), strict=True
+        ):
+            if name in names:
+                found[name] = (max(width_m, depth_m), min(width_m, depth_m), height_m)
 
     return found

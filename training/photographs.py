@@ -20,15 +20,15 @@ from cogmap.services.epam.layout.road import load
 ROAD = 3
 UNLABELLED = 11
 IMAGE_SUFFIXES = (".png", ".jpg")
-# Of folders with CamVid's training photographs, that which is used where several are there.
+# Folders with CamVid's training photographs; the first that is there is used.
 TRAINING_FOLDERS = ("train_320", "train")
 LABEL_SUFFIXES = ("annot", "_annot")
 
 
 @dataclass(frozen=True, eq=False)
 class Photograph:
-    """An RGB image (h, w, 3), which of its pixels show road, and for which of them that is known,
-    (h, w) each.
+    """An RGB image (h, w, 3), and masks (h, w) of its pixels that show `road` and of those for
+    which that is `known`.
     """
 
     name: str
@@ -38,10 +38,11 @@ class Photograph:
 
 
 def training_folders(camvid: Path) -> tuple[Path, Path]:
-    """The folders of training photographs and of their labels in `camvid`: one of TRAINING_FOLDERS,
-    or `camvid` itself; labels are in the folder beside it whose name ends in LABEL_SUFFIXES.
+    """Return the folders of training photographs and of their labels in `camvid`: one of
+    TRAINING_FOLDERS, or `camvid` itself; labels are in the folder beside it whose name ends in
+    LABEL_SUFFIXES.
 
-    Raises UsageError where there are no such folders.
+    Raises UsageError if there are no such folders.
     """
     candidates = [camvid / name for name in TRAINING_FOLDERS]
     for images in (*candidates, camvid.absolute()):
@@ -88,7 +89,7 @@ def photographs(images: Path, labels: Path) -> Iterator[Photograph]:
 
 
 def by_drive(shown: Iterable[Photograph]) -> dict[str, list[Photograph]]:
-    """The photographs of each drive, whose name is what stands before the first _ of theirs."""
+    """Return the photographs of each drive: its name is the part of theirs before the first _."""
     drives: dict[str, list[Photograph]] = {}
     for photograph in shown:
         name, _, _ = photograph.name.partition("_")
@@ -106,8 +107,8 @@ def _photograph(path: Path, label_path: Path) -> Photograph:
     size = image.shape[:2]
     if label.shape != size or label.dtype != np.uint8:
         raise UsageError(
-            f"the label {label_path} is {label.dtype} {label.shape}, where uint8 {size} fits its "
-            "image: make it anew from the labels of that image"
+            f"the label {label_path} is {label.dtype} {label.shape}, but its image needs uint8 "
+            f"{size}: make it anew from the labels of that image"
         )
 
     rgb = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import torch
 from rich.progress import Progress, track
 from torch import Tensor, nn
@@ -24,12 +23,13 @@ from cogmap.services.epam.layout.road import (
     load,
     network_input,
 )
-from cogmap.training.augment import Augmentation, LabelledImage, augmented, resized
+from cogmap.training.augment import Augmentation, LabelledImage, augmented
 from cogmap.training.networks.export import export
 from cogmap.training.networks.loader import prefetch
 from cogmap.training.networks.optimizer import Optimizer, seed_torch
 from cogmap.training.networks.unet import UNet
-from cogmap.training.rendering.reader import SURFACES, files, read, towns
+from cogmap.training.photographs import Photograph, road_iou
+from cogmap.training.rendering.reader import SURFACES, files, read
 
 WIDTHS = (8, 16, 32, 48, 64, 64)
 BATCH = 8
@@ -58,8 +58,9 @@ def train_on_renderings(
 
     Raises UsageError if there are no renderings.
     """
-    held_out = files(folder, "val")
-    images = _images(folder)
+    held_out = track(files(folder, "val"), "testing")
+    training = track(files(folder, "train"), "reading")
+    images = [LabelledImage.of(view.image, view.road, view.known) for view in _views(training)]
 
     schedule = Schedule(
         epochs=epochs or EPOCHS,
@@ -69,18 +70,16 @@ def train_on_renderings(
     )
     net = train(images, schedule, lambda: UNet(CHANNELS, 1, WIDTHS))
     write(net, out)
-    return {"road_iou": _iou(folder, out, len(held_out))}
+    return {"road_iou": road_iou(load(out).mask, _views(held_out))}
 
 
-def _images(folder: Path) -> list[LabelledImage]:
-    """All views of the towns in `folder`/train, with their road."""
-    images = []
-    for path in track(files(folder, "train"), "reading"):
+def _views(paths: Iterable[Path]) -> Iterator[Photograph]:
+    """All views of the towns in these files, with their road."""
+    for path in paths:
         town = read(path)
         for image, surface in zip(town.left, town.surface, strict=True):
-            images.append(_labelled(image, surface))
-
-    return images
+            road = surface == ROAD
+            yield Photograph(path.stem, image, road, known=np.ones_like(road))
 
 
 def train(
@@ -116,10 +115,7 @@ def loss(net: nn.Module, values: Tensor, road: Tensor, known: Tensor) -> Tensor:
     output = padded[:, 0, PADDING_PX:-PADDING_PX]
     of_pixels = functional.binary_cross_entropy_with_logits(output, road, reduction="none")
 
-    of_known = of_pixels * known
-    total = of_known.sum()
-    count = known.sum().clamp(min=1)
-    return total / count
+    return (of_pixels * known).sum() / known.sum().clamp(min=1)
 
 
 def write(net: nn.Module, path: Path) -> None:
@@ -131,7 +127,11 @@ def _batches(
     images: Sequence[LabelledImage], schedule: Schedule, steps: int
 ) -> Iterator[tuple[Singles, Singles, Singles]]:
     rng = np.random.default_rng([schedule.seed, 0x60AD])
-    order = _order(len(images), steps * BATCH, rng)
+
+    # Each image once, in any order, then each once more.
+    rounds = math.ceil(steps * BATCH / len(images))
+    orders = [rng.permutation(len(images)) for _ in range(rounds)]
+    order = np.concatenate(orders)[: steps * BATCH]
 
     for chosen in order.reshape(steps, BATCH):
         batch = [augmented(images[number], schedule.augmentation, rng) for number in chosen]
@@ -142,41 +142,7 @@ def _batches(
         yield network_input(pixels), road, known
 
 
-def _order(count: int, wanted: int, rng: np.random.Generator) -> npt.NDArray[np.intp]:
-    """Which image comes when, (wanted,): each once, in any order, then each once more."""
-    rounds = math.ceil(wanted / count)
-    orders = [rng.permutation(count) for _ in range(rounds)]
-
-    order = np.concatenate(orders)
-    return order[:wanted]
-
-
 def _shares(levels: Sequence[Bytes]) -> Singles:
     """Levels of 0 to 255 as 0 to 1."""
     stacked = np.stack(levels).astype(np.float32)
     return stacked / np.float32(255)
-
-
-def _labelled(image: Bytes, surface: Bytes) -> LabelledImage:
-    is_road = surface == ROAD
-    road = is_road.astype(np.uint8) * 255
-    known = np.full_like(road, 255)
-
-    labelled = LabelledImage(image, road, known)
-    return resized(labelled)
-
-
-def _iou(folder: Path, weights: Path, count: int) -> float:
-    """The IoU of road in the `count` towns of `folder`/val."""
-    segmenter = load(weights)
-    both_px = 0
-    either_px = 0
-    for town in track(towns(folder, "val"), "testing", total=count):
-        views = zip(town.left, town.surface, strict=True)
-        for image, surface in views:
-            found = segmenter.mask(image)
-            road = surface == ROAD
-            both_px += int(np.count_nonzero(found & road))
-            either_px += int(np.count_nonzero(found | road))
-
-    return both_px / max(either_px, 1)

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -17,7 +16,6 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from cogmap.geometry.arrays import Bytes, Floats, Singles
-from cogmap.schemas.sensing import Calibration
 from cogmap.services.epam.recognition.segments import (
     CHANNELS,
     HEIGHT_PX,
@@ -80,27 +78,14 @@ def examples(towns: Iterable[Town]) -> Examples:
     labels = []
     size = (WIDTH_PX, HEIGHT_PX)
     for town in towns:
-        views = zip(town.left, town.stereo_m, town.label, strict=True)
-        for image, depth_m, label in views:
-            example = _example(image, depth_m, town.calibration)
-            small_label = cv2.resize(label, size, interpolation=cv2.INTER_NEAREST)
-            values.append(example)
-            labels.append(small_label)
+        for image, depth_m, label in zip(town.left, town.stereo_m, town.label, strict=True):
+            small = cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8)
+            small_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
+            example = network_input(small, small_m.astype(np.float32), town.calibration)
+            values.append(example.astype(np.float16))
+            labels.append(cv2.resize(label, size, interpolation=cv2.INTER_NEAREST))
 
-    stacked_labels = np.asarray(labels, np.uint8)
-    return Examples(np.asarray(values), stacked_labels)
-
-
-def _example(image: Bytes, depth_m: Singles, camera: Calibration) -> npt.NDArray[np.float16]:
-    size = (WIDTH_PX, HEIGHT_PX)
-    resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
-    small = resized.astype(np.uint8, copy=False)
-
-    resized_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
-    small_m = resized_m.astype(np.float32, copy=False)
-
-    values = network_input(small, small_m, camera)
-    return values.astype(np.float16)
+    return Examples(np.asarray(values), np.asarray(labels, np.uint8))
 
 
 def target(label: Bytes) -> Singles:
@@ -109,83 +94,38 @@ def target(label: Bytes) -> Singles:
     """
     rows, columns = np.nonzero(label)
     number = label[rows, columns]
-    areas = _areas(number, rows, columns)
-
     wanted = np.zeros((5, *label.shape), np.float32)
     wanted[0] = label > 0
-    _draw_centres(wanted[1], areas)
 
-    right_px = areas.centre_column[number] - columns
-    down_px = areas.centre_row[number] - rows
-    wanted[2, rows, columns] = right_px / OFFSET_PX
-    wanted[3, rows, columns] = down_px / OFFSET_PX
-    wanted[4, rows, columns] = _weight(number, areas.size_px)
-    return wanted
-
-
-class _Areas(NamedTuple):
-    """Of each number of a label, (k,): how many pixels show it, and the middle of these."""
-
-    size_px: npt.NDArray[np.intp]
-    centre_row: Floats
-    centre_column: Floats
-
-
-def _areas(number: Bytes, rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]) -> _Areas:
-    """What the pixels of `rows` and `columns` show, by number (n,) each."""
+    # Of each number of the label: how many pixels show it, and the middle of these.
     size_px = np.bincount(number, minlength=1)
-    divisor = np.maximum(size_px, 1)
-
-    row_sum = np.bincount(number, rows, minlength=1)
-    column_sum = np.bincount(number, columns, minlength=1)
-    return _Areas(
-        size_px=size_px,
-        centre_row=row_sum / divisor,
-        centre_column=column_sum / divisor,
-    )
-
-
-def _draw_centres(image: Singles, areas: _Areas) -> None:
-    """Raise `image` (h, w) to a bump at the centre of each large area, larger for a larger one."""
-    is_large = areas.size_px >= MIN_AREA_PX
-
-    for number in np.flatnonzero(is_large):
-        sd_px = np.clip(0.12 * np.sqrt(areas.size_px[number]), 1.5, 5.0)
-        row = areas.centre_row[number]
-        column = areas.centre_column[number]
-
-        bump = _bump(image.shape, row, column, sd_px)
-        np.maximum(image, bump, out=image)
-
-
-def _weight(number: Bytes, size_px: npt.NDArray[np.intp]) -> Floats:
-    """(n,): the weight of each pixel, 1 on the mean: of a large area the less the larger it is."""
     is_large = size_px >= MIN_AREA_PX
     divisor = np.maximum(size_px, 1)
+    centre_row = np.bincount(number, rows, minlength=1) / divisor
+    centre_column = np.bincount(number, columns, minlength=1) / divisor
+
+    # A bump at the centre of each large area, larger for a larger one.
+    for large in np.flatnonzero(is_large):
+        sd_px = np.clip(0.12 * np.sqrt(size_px[large]), 1.5, 5.0)
+        height, width = label.shape
+        down = _gaussian(height, centre_row[large], sd_px)
+        across = _gaussian(width, centre_column[large], sd_px)
+        np.maximum(wanted[1], np.outer(down, across), out=wanted[1])
+
+    # A pixel has less weight, the larger its area; 1 on the mean.
     weight = is_large[number] / np.sqrt(divisor[number])
-
     scale = len(number) / max(float(weight.sum()), 1e-9)
-    weighted: Floats = weight * scale
-    return weighted
 
-
-def _bump(size: tuple[int, ...], row: float, column: float, sd_px: float) -> Floats:
-    """A Gaussian of height 1 about that pixel, (h, w)."""
-    height, width = size
-    down = _gaussian(height, row, sd_px)
-    across = _gaussian(width, column, sd_px)
-
-    return np.outer(down, across)
+    wanted[2, rows, columns] = (centre_column[number] - columns) / OFFSET_PX
+    wanted[3, rows, columns] = (centre_row[number] - rows) / OFFSET_PX
+    wanted[4, rows, columns] = weight * scale
+    return wanted
 
 
 def _gaussian(count: int, middle: float, sd: float) -> Floats:
     """A Gaussian of height 1 at 0, 1, and so on, (count,)."""
-    away = np.arange(count) - middle
-    squared = away**2
-    variance = sd**2
-
-    exponent = -squared / (2 * variance)
-    return np.asarray(np.exp(exponent))
+    squared = (np.arange(count) - middle) ** 2
+    return np.asarray(np.exp(-squared / (2 * sd**2)))
 
 
 def loss(output: Tensor, wanted: Tensor) -> Tensor:
@@ -196,13 +136,11 @@ def loss(output: Tensor, wanted: Tensor) -> Tensor:
 
     wanted_centre = wanted[:, 1]
     squared = (output[:, 1] - wanted_centre).square()
-    emphasis = 1 + 8 * wanted_centre
-    centre = (squared * emphasis).mean()
+    centre = (squared * (1 + 8 * wanted_centre)).mean()
 
     weight = wanted[:, 4]
     error = (output[:, 2:4] - wanted[:, 2:4]).abs()
-    weighted = error.sum(1) * weight
-    offset = weighted.sum() / (weight.sum() + 1)
+    offset = (error.sum(1) * weight).sum() / (weight.sum() + 1)
 
     return building + 20 * centre + 2 * offset
 
@@ -216,31 +154,17 @@ def augmented(
         varied[:7] = varied[:7, :, ::-1]
         label = label[:, ::-1]
 
-    _relight(varied[:3], rng)
+    channel_gain = rng.normal(0, 0.08, (3, 1, 1))
+    gain = np.exp(channel_gain + rng.normal(0, 0.12)).astype(np.float32)
+    varied[:3] = (varied[:3] + 2) * gain - 2 + rng.normal(0, 0.05)
+
+    # Depth is lost in some patches, and what follows from it.
     if rng.random() < 0.3:
-        _lose_depth(varied[3:6], rng)
+        coarse = rng.random((15, 20), np.float32)
+        field = cv2.resize(coarse, (WIDTH_PX, HEIGHT_PX))
+        varied[3:6, field < rng.uniform(0, 0.4)] = 0.0
 
     return varied, label
-
-
-def _relight(colours: Singles, rng: np.random.Generator) -> None:
-    """Change the light on colours (3, h, w), in place."""
-    channel_gain = rng.normal(0, 0.08, (3, 1, 1))
-    overall_gain = rng.normal(0, 0.12)
-    gain = np.exp(channel_gain + overall_gain).astype(np.float32)
-    offset = rng.normal(0, 0.05)
-
-    light = colours + 2
-    colours[:] = light * gain - 2 + offset
-
-
-def _lose_depth(channels: Singles, rng: np.random.Generator) -> None:
-    """Set what follows from depth (3, h, w) to 0 in some patches, in place."""
-    coarse = rng.random((15, 20), np.float32)
-    field = cv2.resize(coarse, (WIDTH_PX, HEIGHT_PX))
-
-    is_lost = field < rng.uniform(0, 0.4)
-    channels[:, is_lost] = 0.0
 
 
 def train_on_renderings(

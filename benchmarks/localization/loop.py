@@ -26,6 +26,7 @@ from cogmap.schemas.nodes import (
     AnyNode,
     Map,
     Object,
+    PathIntegration,
     PathSegment,
     Self,
     object_id,
@@ -60,8 +61,7 @@ def sections(surveyed: bool) -> Sections:
         "kept_samples": 100,
         "landmark_samples": 1000,
         "correlated_views": 1.0,
-        "correlated_sightings": 1.0,
-        "landmark_sides": 1,
+        "landmarks": "points",
         "landmark_jitter_m": 0.003,
         "speed_gain_sd": SPEED,
         "turn_gain_sd": TURN,
@@ -75,7 +75,6 @@ def sections(surveyed: bool) -> Sections:
         "heading_variance_per_rad": TURN**2,
         # The whole path is evaluated.
         "sparse_after_s": NEVER_S,
-        "waiting_share": 0.0,
     }
 
     if surveyed:
@@ -102,9 +101,7 @@ def initial_map(start: Pose, landmarks: Landmarks, surveyed: bool, cycle: int) -
         x_m=x_m,
         y_m=y_m,
         heading_rad=heading_rad,
-        odometry_x_m=x_m,
-        odometry_y_m=y_m,
-        odometry_heading_rad=heading_rad,
+        odometry=PathIntegration(x_m=x_m, y_m=y_m, heading_rad=heading_rad),
         samples=Matrix.of(np.tile(np.array(start), (SAMPLES, 1))),
     )
     nodes: list[AnyNode] = [Map(id=ROOT_MAP, cell_m=1.0), agent]
@@ -204,8 +201,7 @@ class LocalizationLoop:
     @property
     def odometry(self) -> Floats:
         """(3,): the agent's pose by path integration alone."""
-        agent = self._agent
-        return np.array([agent.odometry_x_m, agent.odometry_y_m, agent.odometry_heading_rad])
+        return self._agent.odometry.pose()
 
     @property
     def path(self) -> Floats:

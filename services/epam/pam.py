@@ -185,7 +185,12 @@ class ExtendedPam:
                 number = 1 + len({label for label, _ in self._recognizer.learned})
                 learned.append(self._learn(NEW_LABEL.format(number), recognition))
                 candidate = self._recognized(candidate, expected)
-            elif learning and recognition.label not in pieces and self._looks_new(recognition):
+            elif (
+                learning
+                and recognition.label not in pieces
+                and min(recognition.evidence, recognition.appearance.whole) > SURE
+                and self._recognizer.is_new_appearance(recognition)
+            ):
                 learned.append(self._learn(recognition.label, recognition))
 
             pieces.setdefault(candidate.recognition.label, []).append(candidate)
@@ -215,11 +220,6 @@ class ExtendedPam:
         is_taught = self._recognizer.is_taught(recognition.label)
         familiar = self._config.familiar if is_taught else self._config.familiar_learned
         return recognition.activation <= familiar
-
-    def _looks_new(self, recognition: Recognition) -> bool:
-        """True if it is likely a learned building, in an appearance that was not learned."""
-        certainty = min(recognition.evidence, recognition.appearance.whole)
-        return certainty > SURE and self._recognizer.is_new_appearance(recognition)
 
     def _learn(self, label: str, recognition: Recognition) -> LearnedObject:
         embedding = recognition.appearance.embedding

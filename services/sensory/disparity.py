@@ -27,12 +27,12 @@ NOISE_GRADIENT = 1.0
 
 
 class StereoMatcher:
-    """Finds disparities up to `most_px`, rounded up to a multiple of 16, in rectified pairs of any
+    """Finds disparities up to `max_px`, rounded up to a multiple of 16, in rectified pairs of any
     size.
     """
 
-    def __init__(self, most_px: float) -> None:
-        self._disparities = max(16, 16 * math.ceil(most_px / 16))
+    def __init__(self, max_px: float) -> None:
+        self._disparities = max(16, 16 * math.ceil(max_px / 16))
         self._matcher = cv2.StereoSGBM.create(
             minDisparity=0,
             numDisparities=self._disparities,
@@ -74,8 +74,8 @@ class DepthFromStereo:
         self._focal_baseline = calibration.fx_px * calibration.baseline_m
 
         nearest_px = self._focal_baseline / nearest_m
-        most_px = min(nearest_px, MAX_DISPARITIES, calibration.width_px)
-        self._matcher = StereoMatcher(most_px)
+        max_px = min(nearest_px, MAX_DISPARITIES, calibration.width_px)
+        self._matcher = StereoMatcher(max_px)
 
     def depth_m(self, left: Bytes, right: Bytes) -> Singles:
         """Return the depth along the optical axis of each pixel of `left`, float32 (h, w), 0 for

@@ -20,8 +20,8 @@ SCALE = 64 / 112
 NORMALIZED = 5
 WINDOW_PX = 17
 DARKEST = 0.05
-LEAST_CONTRAST = 0.15
-LEAST_DIFFERENCE = 0.05
+MIN_CONTRAST = 0.15
+MIN_DIFFERENCE = 0.05
 
 
 class PhotographNet(nn.Module):
@@ -47,8 +47,8 @@ class PhotographNet(nn.Module):
 
 
 def normalized(colours: Tensor) -> Tensor:
-    """Return what stays when light and camera change, (n, NORMALIZED, h, w): the logarithm of the
-    brightness against that around it and against the whole image's, and the colours less the
+    """Return values that hardly depend on light and camera, (n, NORMALIZED, h, w): the logarithm of
+    the brightness against that around it and against the whole image's, and the colours less the
     image's mean, all in standard deviations.
 
     A normalization by the surroundings is local contrast normalization (Jarrett, Kavukcuoglu,
@@ -61,17 +61,17 @@ def normalized(colours: Tensor) -> Tensor:
 
     from_around = brightness - _around(brightness)
     deviation = torch.sqrt(_around(from_around.square()))
-    local = from_around / (deviation + LEAST_CONTRAST)
+    local = from_around / (deviation + MIN_CONTRAST)
 
-    whole = _standardized(brightness, LEAST_CONTRAST)
-    return torch.cat([local, whole, _standardized(tint, LEAST_DIFFERENCE)], dim=1)
+    whole = _standardized(brightness, MIN_CONTRAST)
+    return torch.cat([local, whole, _standardized(tint, MIN_DIFFERENCE)], dim=1)
 
 
-def _standardized(values: Tensor, least: float) -> Tensor:
-    """`values` less their mean in each image, in standard deviations; `least` is added to these."""
+def _standardized(values: Tensor, minimum: float) -> Tensor:
+    """`values` less their mean in each image, in standard deviations plus `minimum`."""
     from_mean = values - values.mean((2, 3), keepdim=True)
     deviation = torch.sqrt(from_mean.square().mean((2, 3), keepdim=True))
-    return from_mean / (deviation + least)
+    return from_mean / (deviation + minimum)
 
 
 def _around(values: Tensor) -> Tensor:

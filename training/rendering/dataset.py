@@ -1,4 +1,4 @@
-"""Renders what perception is trained on.
+"""Renders the towns that perception is trained on.
 
 The simulator draws towns from seeds, each view in a light of its own and from another place, and
 labels what it knows; sensory memory adds the depth from stereo. Towns for training are in the
@@ -16,12 +16,17 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
+import msgspec
 import numpy as np
 
 from cogmap.errors import CogmapError
 from cogmap.parallel import Progress, parallel_map
-from cogmap.training.rendering.stereo import with_stereo_depth
-from cogmap.training.rendering.towns import render_town
+from cogmap.schemas.sensing import Calibration
+from cogmap.services.sensory.disparity import DepthFromStereo
+from cogmap.services.sensory.module import Config
+from cogmap.services.sensory.rectify import rectification
+from cogmap.training.rendering.towns import Views, render_town
 
 
 @dataclass(frozen=True)
@@ -56,7 +61,7 @@ class Job:
 
 
 def jobs(out: Path, scale: float) -> Iterator[Job]:
-    """Return what there is to render: the towns of each split times `scale`, at least one."""
+    """Return the jobs of rendering: the towns of each split times `scale`, at least one."""
     for split in SPLITS:
         for number in range(max(1, round(scale * split.towns))):
             seed = split.first_seed + number
@@ -84,6 +89,32 @@ def render(job: Job) -> None:
         part = Path(folder) / job.target.name
         np.savez(part, allow_pickle=False, **views)
         part.replace(job.target)
+
+
+def with_stereo_depth(views: Views) -> Views:
+    """Return `views` with the rectified `left` image and its calibration, and, instead of the
+    `right` image, the depth `stereo_m` float32 (n, h, w), 0 where it is unknown.
+    """
+    cv2.setNumThreads(1)
+    encoded = views["calibration"].tobytes()
+    calibration = msgspec.json.decode(encoded, type=Calibration)
+    rectified = rectification(calibration)
+    matcher = DepthFromStereo(rectified.calibration, Config().nearest_m)
+
+    lefts = []
+    depths_m = []
+    for raw_left, raw_right in zip(views["left"], views["right"], strict=True):
+        left, right = rectified.apply(raw_left, raw_right)
+        lefts.append(left)
+        depths_m.append(matcher.depth_m(left, right))
+
+    rectified_encoded = msgspec.json.encode(rectified.calibration)
+    unchanged = {key: value for key, value in views.items() if key not in ("left", "right")}
+    return unchanged | {
+        "left": np.asarray(lefts),
+        "stereo_m": np.asarray(depths_m),
+        "calibration": np.frombuffer(rectified_encoded, np.uint8),
+    }
 
 
 def render_all(

@@ -54,57 +54,31 @@ def viewpoints(place: town.Town, count: int, rng: np.random.Generator) -> Iterat
     """
     for number in range(count):
         if number % 2 == 0:
-            yield _on_a_street(place, rng)
+            road = place.roads[int(rng.integers(len(place.roads)))]
+            along_m = rng.uniform(0, road.length_m)
+            x_m, y_m = road.point(along_m, rng.uniform(-3, 3))
+            half_turns = int(rng.integers(2))
+            heading_rad = road.heading_rad + math.pi * half_turns + rng.normal(0, 0.5)
         else:
-            yield _facing_a_building(place, rng)
+            plot = place.plots[int(rng.integers(len(place.plots)))]
+            while True:
+                range_m = rng.uniform(6, 60)
+                bearing_rad = rng.uniform(-math.pi, math.pi)
+                x_m = plot.x_m - range_m * math.cos(bearing_rad)
+                y_m = plot.y_m - range_m * math.sin(bearing_rad)
+                if is_free(place, x_m, y_m):
+                    break
+            heading_rad = bearing_rad + rng.normal(0, 0.35)
 
-
-def _facing_a_building(place: town.Town, rng: np.random.Generator) -> Pose:
-    number = int(rng.integers(len(place.plots)))
-    plot = place.plots[number]
-    while True:
-        range_m = rng.uniform(6, 60)
-        bearing_rad = rng.uniform(-math.pi, math.pi)
-        x_m = plot.x_m - range_m * math.cos(bearing_rad)
-        y_m = plot.y_m - range_m * math.sin(bearing_rad)
-        if is_free(place, x_m, y_m):
-            break
-
-    heading_rad = bearing_rad + rng.normal(0, 0.35)
-    return _pose(x_m, y_m, heading_rad)
-
-
-def _on_a_street(place: town.Town, rng: np.random.Generator) -> Pose:
-    number = int(rng.integers(len(place.roads)))
-    road = place.roads[number]
-
-    along_m = rng.uniform(0, road.length_m)
-    across_m = rng.uniform(-3, 3)
-    x_m, y_m = road.point(along_m, across_m)
-
-    half_turns = int(rng.integers(2))
-    direction_rad = road.heading_rad + math.pi * half_turns
-    heading_rad = direction_rad + rng.normal(0, 0.5)
-    return _pose(x_m, y_m, heading_rad)
-
-
-def _pose(x_m: float, y_m: float, heading_rad: float) -> Pose:
-    """The pose with its heading wrapped."""
-    return Pose(
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=math.remainder(heading_rad, math.tau),
-    )
+        yield Pose(x_m=x_m, y_m=y_m, heading_rad=math.remainder(heading_rad, math.tau))
 
 
 def is_free(place: town.Town, x_m: float, y_m: float) -> bool:
-    """Return whether the robot can stand there, away from buildings and outside of props."""
+    """Return true if the robot can stand there, away from buildings and outside of props."""
     here = (x_m, y_m, x_m, y_m)
-    for plot in place.plots:
-        if plan.overlap(here, plot.footprint, BUILDING_MARGIN_M):
-            return False
-
-    return not any(plan.overlap(here, prop.area, PROP_MARGIN_M) for prop in place.props)
+    return not any(
+        plan.overlap(here, plot.footprint, BUILDING_MARGIN_M) for plot in place.plots
+    ) and not any(plan.overlap(here, prop.area, PROP_MARGIN_M) for prop in place.props)
 
 
 def render_town(seed: int, count: int, invented_count: int = 0) -> Views:
@@ -120,10 +94,16 @@ def render_town(seed: int, count: int, invented_count: int = 0) -> Views:
     finally:
         world.close()
 
-    town_views = _known(world, camera)
-    for key in views[0]:
-        town_views[key] = np.asarray([view[key] for view in views])
-    return town_views
+    kinds_of_plots = [plot.kind for plot in place.plots]
+    sizes_m = [(kind.width_m, kind.depth_m, kind.height_m) for kind in kinds_of_plots]
+    encoded = msgspec.json.encode(camera.calibration)
+    town_views = {
+        "names": np.asarray([kind.name for kind in kinds_of_plots]),
+        "place_m": np.asarray([(plot.x_m, plot.y_m) for plot in place.plots]),
+        "size_m": np.asarray(sizes_m),
+        "calibration": np.frombuffer(encoded, np.uint8),
+    }
+    return town_views | {key: np.asarray([view[key] for view in views]) for key in views[0]}
 
 
 def labelled(
@@ -142,31 +122,13 @@ def labelled(
     }
 
 
-def _known(world: World, camera: StereoCamera) -> Views:
-    """What all views of a town have in common."""
-    plots = world.town.plots
-    kinds_of_plots = [plot.kind for plot in plots]
-    places_m = [(plot.x_m, plot.y_m) for plot in plots]
-    sizes_m = [(kind.width_m, kind.depth_m, kind.height_m) for kind in kinds_of_plots]
-    encoded = msgspec.json.encode(camera.calibration)
-
-    return {
-        "names": np.asarray([kind.name for kind in kinds_of_plots]),
-        "place_m": np.asarray(places_m),
-        "size_m": np.asarray(sizes_m),
-        "calibration": np.frombuffer(encoded, np.uint8),
-    }
-
-
 def labels(world: World, exposure: Exposure) -> Bytes:
     """Return which building each pixel shows, uint8 (h, w): 0 for none, else 1 + its row among the
     town's.
     """
     label = np.zeros(exposure.body.shape, np.uint8)
     for number, body in enumerate(world.building_of_body):
-        is_shown = exposure.body == body
-        label[is_shown] = 1 + number
-
+        label[exposure.body == body] = 1 + number
     return label
 
 
@@ -180,8 +142,7 @@ def surfaces(world: World, exposure: Exposure) -> Bytes:
     }
     surface = np.full(exposure.body.shape, SURFACES.index("ground"), np.uint8)
     for name, bodies in bodies_of.items():
-        is_shown = np.isin(exposure.body, list(bodies))
-        surface[is_shown] = SURFACES.index(name)
+        surface[np.isin(exposure.body, list(bodies))] = SURFACES.index(name)
 
     surface[exposure.body < 0] = SURFACES.index("sky")
     return surface

@@ -92,7 +92,7 @@ class PlaceRecognizer:
         self._last_vector = vector
         self._step += 1
         self._update_belief(vectors)
-        self._matches = self._best_match()
+        self._matches = self._likeliest_match()
         if self._matches or not learning:
             return list(self._matches), []
 
@@ -157,7 +157,7 @@ class PlaceRecognizer:
         ratios[self._step_of_view > self._step - RECENT_VIEWS] = 0.0
         return np.asarray(ratios)
 
-    def _best_match(self) -> list[PlaceMatch]:
+    def _likeliest_match(self) -> list[PlaceMatch]:
         """The likeliest remembered view, if its probability with its neighbours' reaches the
         threshold.
         """

@@ -102,10 +102,10 @@ def _no_road(images: Path, labels: Path) -> None:
     ("spoil", "said"),
     [
         (_without_a_label, r"1\.png has no label .*labels/1\.png: add it"),
-        (_label_of_another_size, r"labels/1\.png is uint8 \(8, 8\), where uint8 \(240, 320\) fits"),
+        (_label_of_another_size, r"labels/1\.png is uint8 \(8, 8\), but its image needs uint8"),
         (
             _label_in_colour,
-            r"labels/1\.png is uint8 \(240, 320, 3\), where uint8 \(240, 320\) fits",
+            r"labels/1\.png is uint8 \(240, 320, 3\), but its image needs uint8",
         ),
         (_no_image, r"images/1\.png is no image"),
         (_an_empty_file, r"labels/1\.png is no image"),
