@@ -19,7 +19,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Proposal
-from cogmap.schemas.graph import Decay, Snapshot
+from cogmap.schemas.graph import Decay, Delta, Snapshot
 from cogmap.schemas.nodes import (
     ROOT_MAP,
     SELF_ID,
@@ -51,6 +51,8 @@ CERTAIN_M = 1e-3
 LANDMARK_SAMPLES = 50
 KNOWN_SIGHTINGS = 100
 Pose = tuple[float, float, float]
+LATE = " is late: "
+"""How the workspace begins the reason for a late answer, after its name."""
 Landmarks = dict[str, tuple[float, float]]
 
 
@@ -129,6 +131,8 @@ class LocalizationLoop:
     """Runs both modules on the in-memory bus, one cognitive cycle for each moment of a log.
 
     `task_s` has each task of the last cycle: its codelet, and the CPU time that the worker took.
+    `late_answers` counts the answers of background codelets that came after what they would change
+    had changed: the workspace rejects these in every drive.
     """
 
     def __init__(
@@ -140,6 +144,7 @@ class LocalizationLoop:
     ) -> None:
         self.task_s: list[tuple[str, float]] = []
         self._graph = Graph()
+        self.late_answers = 0
         self._rejected: list[str] = []
         self._frame = 0
         self._until_ns = 0
@@ -154,15 +159,13 @@ class LocalizationLoop:
         for topic in (topics.TASK, topics.LEASES):  # it begins with whichever comes later
             worker.handlers[topic] = self._timed(worker.handlers[topic])
 
-        observer = Module("observer").following(
-            self._graph, lambda delta: self._rejected.extend(delta.reasons)
-        )
+        observer = Module("observer").following(self._graph, self.count_rejected)
         self._senses = Module("senses")
         self._senses.emits.update((topics.SELF_MOTION, topics.PERCEPTS))
         self._runner = InProcessRunner([workspace, worker, observer, self._senses])
 
     def live(self, moment: Moment) -> None:
-        """Run one cycle to its end. Raises CogmapError if an answer was not committed."""
+        """Run one cycle. Raises CogmapError if an answer was rejected that was not late."""
         stamp_ns = round(moment.stamp_s * 1e9)
         motion = SelfMotion(
             stamp_ns=stamp_ns,
@@ -213,6 +216,14 @@ class LocalizationLoop:
         if self._graph.agent is None:
             raise CogmapError("the graph has no self node")
         return self._graph.agent
+
+    def count_rejected(self, delta: Delta) -> None:
+        """Count the late answers that a delta names, and keep why others were rejected."""
+        for reason in delta.reasons:
+            if LATE in reason:
+                self.late_answers += 1
+            else:
+                self._rejected.append(reason)
 
     def _timed(self, handler: Handler) -> Handler:
         def on_message(message: Message) -> list[Proposal]:

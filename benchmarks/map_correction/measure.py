@@ -16,7 +16,7 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from benchmarks.timing import timed
 from benchmarks.trajectory import trajectory_error_m
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.estimation.incremental import IncrementalSolver
 from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pose_graph import PoseGraph, cost

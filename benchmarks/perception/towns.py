@@ -29,7 +29,7 @@ from benchmarks.perception.scenes import (
 )
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.geometry.arrays import Floats, Singles
 from cogmap.parallel import parallel_map
 from cogmap.schemas.sensing import Pose
