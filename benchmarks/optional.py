@@ -14,7 +14,7 @@ REMEDY = "is not installed, and this benchmark needs it: run make bench-setup"
 
 
 def gtsam() -> Any:
-    """The package gtsam, which has no types. Raises UsageError where it is not installed."""
+    """The package gtsam, which has no types. Raises UsageError if it is not installed."""
     try:
         import gtsam
     except ImportError:
@@ -24,7 +24,7 @@ def gtsam() -> Any:
 
 
 def scikit_learn() -> Any:
-    """The package scikit-learn, which has no types. Raises UsageError where it is not installed."""
+    """The package scikit-learn, which has no types. Raises UsageError if it is not installed."""
     try:
         import sklearn.metrics
         import sklearn.mixture
@@ -35,7 +35,7 @@ def scikit_learn() -> Any:
 
 
 def threadpoolctl() -> Any:
-    """The package threadpoolctl, which has no types. Raises UsageError where it is missing."""
+    """The package threadpoolctl, which has no types. Raises UsageError if it is missing."""
     try:
         import threadpoolctl
     except ImportError:

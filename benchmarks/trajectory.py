@@ -15,7 +15,7 @@ def trajectory_error_m(positions_m: Floats, truth_m: Floats) -> float:
     """Root mean square distance of (n, 2) positions from the true ones, once aligned with them.
 
     Aligned in the plane, by a rotation and a translation (Umeyama 1991); the scale stays. Raises
-    UsageError where evo is not installed.
+    UsageError if evo is not installed.
     """
     try:
         from evo.core.geometry import umeyama_alignment

@@ -14,7 +14,7 @@ LAPS = 100.0
 
 
 def measure(folder: Path) -> Metrics:
-    """How many NEVER_DROP messages were published, and how many the worst receiver never got.
+    """Count the NEVER_DROP messages published, and those that the worst receiver never got.
 
     A topic's loss is the largest that any subscriber counted. `folder` holds the drive's files.
     """

@@ -19,7 +19,7 @@ _spawn = multiprocessing.get_context("spawn")
 
 @dataclass
 class Race:
-    """What the processes of one run share: `number` messages travel through `endpoint`.
+    """The state that the processes of one run share: `number` messages travel through `endpoint`.
 
     Each process releases `ready`; `go` starts the publisher; each receiver releases `done` when it
     has the last message; `end` lets all exit. `cpu_s` sums what they spent between ready and end.
@@ -71,7 +71,7 @@ def pace(
     """Let a process `publish` `number` messages to REPLICAS that `receive` them.
 
     The router at `endpoint` runs in the calling process, whose CPU time counts. Raises
-    CogmapError where a process does not answer within TIMEOUT_S.
+    CogmapError if a process does not answer within TIMEOUT_S.
     """
     race = Race.at(endpoint, number)
     processes = []

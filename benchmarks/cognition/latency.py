@@ -1,4 +1,4 @@
-"""How long after a sighting something is conscious, and an action selected: from a drive's log."""
+"""The times from a view to the broadcast and to the action that it leads to, from a log."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
-"""Whether a building is named better when its neighbours were just conscious: two laps of held-out
-towns, each view in another light, seen by two extended PAMs, one of which expects nothing.
+"""The names of buildings whose neighbours were just conscious: two laps of held-out towns, each
+view in another light, seen by two extended PAMs, one of which expects nothing.
 
 Clear views of these towns are hardly ever ambiguous, so there is fog in the second lap.
 """

@@ -52,7 +52,7 @@ LANDMARK_SAMPLES = 50
 KNOWN_SIGHTINGS = 100
 Pose = tuple[float, float, float]
 LATE = " is late: "
-"""How the workspace begins the reason for a late answer, after its name."""
+"""The workspace puts it into the reason for a late answer, after the answer's name."""
 Landmarks = dict[str, tuple[float, float]]
 
 

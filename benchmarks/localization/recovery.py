@@ -1,4 +1,4 @@
-"""How soon a robot knows again where it is, after a part of its log was cut out."""
+"""The time until a robot is localized again after a part of its log was cut out."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ HOLDS_S = 20.0
 
 class Recovery(NamedTuple):
     """After one cut: the time until the error is below FOUND_M for HOLDS_S, and how much of the
-    time after that it is above; all of the time that was watched where it never is.
+    time after that it is above; all of the time that was watched if it never is.
     """
 
     lost_s: float

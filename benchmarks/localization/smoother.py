@@ -21,7 +21,7 @@ def smooth(moments: Sequence[Moment]) -> Floats:
     """Return (n, 3) poses at the moments that fit all percepts and motions best; the start is at 0.
 
     Levenberg-Marquardt on the same percepts, motions and noise that the codelets get; landmarks are
-    unknown. Raises UsageError where gtsam is not installed.
+    unknown. Raises UsageError if gtsam is not installed.
     """
     problem = Problem()
 

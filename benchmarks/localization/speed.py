@@ -114,7 +114,7 @@ def measure() -> Metrics:
     `update_ms_*` is of the localization codelet alone, on the small map; the ratio is of all tasks
     of a cycle. Linear algebra has one thread, as in processes of the system.
 
-    Raises UsageError where threadpoolctl is not installed.
+    Raises UsageError if threadpoolctl is not installed.
     """
     small = Circle(SMALL)
     large = Circle(LARGE)

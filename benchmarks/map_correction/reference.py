@@ -44,7 +44,7 @@ def best_positions(graph: PoseGraph) -> Floats:
 
 
 class Gtsam:
-    """The same graph for gtsam. Raises UsageError where gtsam is not installed."""
+    """The same graph for gtsam. Raises UsageError if gtsam is not installed."""
 
     def __init__(self, poses: Floats, constraints: Constraints) -> None:
         self._gtsam = optional.gtsam()

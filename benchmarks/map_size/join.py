@@ -78,7 +78,7 @@ def _resident_bytes() -> int:
 
 
 def join(learned: Snapshot) -> Joined:
-    """Measure a worker of its own process. Raises CogmapError where it answers nothing in time."""
+    """Measure a worker of its own process. Raises CogmapError if it answers nothing in time."""
     endpoint = free_endpoint()
     router = open_router(endpoint)
     configured = sections()

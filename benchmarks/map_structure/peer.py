@@ -1,4 +1,4 @@
-"""What sub-maps are compared by and with: scikit-learn's index and its mixture."""
+"""The peer of sub-maps: scikit-learn's mixture, and its index of agreement."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ SEED = 0
 
 
 def adjusted_rand_index(truth: Indices, labels: Indices) -> float:
-    """The adjusted Rand index of two partitions (n,): 1 where they are the same, about 0 where they
-    agree by chance alone.
+    """Return the adjusted Rand index of two partitions (n,): 1 if they are the same, about 0 if
+    they agree by chance alone.
     """
     metrics: Any = scikit_learn().metrics
     return float(metrics.adjusted_rand_score(truth, labels))
@@ -35,7 +35,7 @@ def gaussian_mixture(positions_m: Floats) -> Indices:
         random_state=SEED,
     )
     with warnings.catch_warnings():
-        # It warns where it has not converged after all iterations, and is taken as it is.
+        # It warns if it has not converged after all iterations, and is taken as it is.
         warnings.simplefilter("ignore")
         labels = model.fit_predict(positions_m)
 

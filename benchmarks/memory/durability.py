@@ -1,4 +1,4 @@
-"""What the database loses: to kills of the process that writes it, and to damage of its file."""
+"""Records that the database loses to kills of its writer, and to damage of its file."""
 
 from __future__ import annotations
 

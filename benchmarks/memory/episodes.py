@@ -1,4 +1,4 @@
-"""How many episodes are recalled from a part of what was conscious, near to where that was.
+"""Recall of episodes from a part of their content, near the place at which they were.
 
 A town has buildings of few looks, so that most episodes share content with many others. A cue has
 two thirds of the content of one, something else in the place of the rest, and a position that is

@@ -1,4 +1,4 @@
-"""How many cognitive maps a sparse distributed memory recalls from corrupted cues.
+"""Recall of cognitive maps from corrupted cues by a sparse distributed memory.
 
 A map is a record: a few objects, of kinds that other maps have too, each bound to the role of the
 place that it is at. The maps are stored at themselves, and each cue is one of them in which a share

@@ -55,7 +55,7 @@ class Sight:
 def sight(
     claims: Sequence[Claim], label: Bytes, kinds: Sequence[str], range_m: Sequence[float]
 ) -> Sight:
-    """What is claimed of a view against its true `label` (h, w): 0 or 1 + place in `kinds` and
+    """Compare the claims of a view with its true `label` (h, w): 0 or 1 + place in `kinds` and
     `range_m`.
     """
     numbers, pixels = np.unique(label[label > 0], return_counts=True)
@@ -85,7 +85,7 @@ def sight(
 
 
 def claims(percepts: Sequence[Percept], shape: tuple[int, ...]) -> list[Claim]:
-    """What `percepts` of a view of that shape claim."""
+    """Return the claims of the `percepts` of a view of that shape."""
     found = []
     for percept in percepts:
         pixels = filled(percept, shape)

@@ -37,7 +37,7 @@ PRIOR_LEVELS = np.linspace(0.05, 0.95, 19)
 def measure(camvid: Path, folder: Path) -> Metrics:
     """Train on CamVid's `train` photographs, and measure on its `val`; the weights go to `folder`.
 
-    Raises UsageError where torch is not installed, or the photographs cannot be read.
+    Raises UsageError if torch is not installed, or the photographs cannot be read.
     """
     weights = folder / "road-camvid.onnx"
     _train(photographs(camvid / "train", camvid / "trainannot"), weights)
@@ -59,7 +59,7 @@ def measure_by_drive(
 
     `camvid_iou_other_drive` is the mean over drives, `camvid_prior_other_drive` that of one mask
     for all images of the drive left out, the mean of those of the others. Both stand there by drive
-    too, and how long training took. Raises UsageError where torch is not installed, the photographs
+    too, and how long training took. Raises UsageError if torch is not installed, the photographs
     cannot be read, or are of a single drive.
     """
     image_folder, label_folder = training_folders(camvid)
@@ -101,7 +101,7 @@ def _train(
     epochs: int | None = None,
     images: int | None = None,
 ) -> None:
-    """Raises UsageError where torch is not installed."""
+    """Raises UsageError if torch is not installed."""
     try:
         from cogmap.training.camvid import train_on
     except ImportError as error:

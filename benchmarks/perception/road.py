@@ -1,4 +1,4 @@
-"""How well road is found: its pixels, and where it ends on the ground."""
+"""The accuracy of road: of its pixels, and of its edges on the ground."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def road_edges_missed_m(
 
 
 def road_edge_error_m(errors_m: list[Floats]) -> float:
-    """The median over all points of all views. NaN where there is no point."""
+    """The median over all points of all views. NaN if there is no point."""
     every_m = np.concatenate([*errors_m, np.empty(0)])
     if not every_m.size:
         return float("nan")
@@ -62,8 +62,8 @@ def road_edge_error_m(errors_m: list[Floats]) -> float:
 def true_boundary_m(
     surface: Bytes, depth_m: Singles, camera: Calibration, within_m: float
 ) -> Floats:
-    """Where road and other ground are neighbours in the image: points half way between, (n, 2), in
-    the robot's frame.
+    """Return points (n, 2) half way between road and other ground that are neighbours in the image,
+    in the robot's frame.
 
     Where something upright hides the ground, or the image ends, nobody can see the road end.
     """

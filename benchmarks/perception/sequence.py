@@ -59,9 +59,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Answer:
-    """Where a view was taken, in which town and on which part of the drive, and the place that it
-    was matched with.
-    """
+    """The town, part of the drive and pose of a view, and the place that it was matched with."""
 
     seed: int
     part: int
@@ -219,7 +217,7 @@ def recall(score: Floats, right: Booleans, wanted: Booleans, precision: float) -
     """The share of `wanted` views that are matched rightly, at the lowest score that gives at least
     `precision`.
 
-    0 where no score does; a view of score 0 is not matched.
+    0 if no score does; a view of score 0 is not matched.
     """
     scores = score[score > 0]
     for min_score in np.unique(scores):

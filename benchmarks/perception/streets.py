@@ -1,4 +1,4 @@
-"""Where the streets of a town end, from its plan."""
+"""The edges of a town's streets, from its plan."""
 
 from __future__ import annotations
 

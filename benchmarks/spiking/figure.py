@@ -65,7 +65,7 @@ def figure(scenes: list[Scene], seeds: Sequence[int]) -> Figure:
 
 
 def _draw_prior(axes: Axes, cues: Cues, spikes: Recording) -> None:
-    """How often the grid cells of each place cell fired together."""
+    """Show the counts of the cycles in which all grid cells of each place cell fired."""
     together = np.full_like(spikes.place, ALL_BITS)
     for spacing_m, fired in zip(SPACINGS_M, spikes.grid, strict=True):
         nearest = GridModule(spacing_m).nearest(spikes.centres_m)
@@ -78,7 +78,7 @@ def _draw_prior(axes: Axes, cues: Cues, spikes: Recording) -> None:
 
 
 def _draw_likelihood(axes: Axes, cues: Cues, spikes: Recording) -> None:
-    """How often the border cells of each place cell fired together."""
+    """Show the counts of the cycles in which all border cells of each place cell fired."""
     cells = BorderCells(SIDE_M)
     together = np.full_like(spikes.place, ALL_BITS)
     for axis, fired in enumerate(spikes.border):

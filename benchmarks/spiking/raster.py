@@ -37,7 +37,7 @@ class Train:
         return np.unpackbits(self.spikes)
 
     def times_s(self, first_cycle: int) -> Values:
-        """When it fired within SHOWN_S of `first_cycle`, in seconds from there."""
+        """Return the times of its spikes within SHOWN_S of `first_cycle`, in seconds from there."""
         end_cycle = first_cycle + round(SHOWN_S / GAMMA_S)
         shown = self.cycles[first_cycle:end_cycle]
         cycles = np.flatnonzero(shown).astype(np.float64)
