@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.map_correction.files import read_truth
+from benchmarks.optional import trajectory_error_m
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from benchmarks.trajectory import trajectory_error_m
 from cogmap.cli.progress import bar
 from cogmap.errors import UsageError
 from cogmap.estimation.gnc import inliers

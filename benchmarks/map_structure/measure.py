@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from benchmarks.benchmark import Setting
-from benchmarks.map_structure.peer import adjusted_rand_index, gaussian_mixture
 from benchmarks.map_structure.towns import FUNCTIONS, Town, town
+from benchmarks.optional import scikit_learn
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most, more_than
 from cogmap.experiments.map_structure.boundaries import Boundaries
-from cogmap.geometry.arrays import Indices
+from cogmap.geometry.arrays import Floats, Indices
 from cogmap.services.codelets.sub_maps.config import Config
 from cogmap.services.codelets.sub_maps.sub_maps import SubMaps
 
@@ -32,6 +34,8 @@ CITY_OBJECTS = 10_000
 ARRIVALS = 500
 REPEATS = 3
 ORDER_SEED = 7
+MAX_COMPONENTS = 24
+MAX_ITERATIONS = 1000
 
 WITHOUT: Mapping[str, Config] = {
     "ari_without_position": Config(position_weight=0.0, spacing_weight=0.0),
@@ -136,3 +140,30 @@ def _speed() -> Metrics:
         "incremental_ms_p99": float(np.percentile(added_ms, 99)),
         "incremental_ms_max": max(added_ms),
     }
+
+
+def adjusted_rand_index(truth: Indices, labels: Indices) -> float:
+    """Return the adjusted Rand index of two partitions (n,): 1 if they are the same, about 0 if
+    they agree by chance alone.
+    """
+    metrics: Any = scikit_learn().metrics
+    return float(metrics.adjusted_rand_score(truth, labels))
+
+
+def gaussian_mixture(positions_m: Floats) -> Indices:
+    """(n,): the labels that a Gaussian mixture with a Dirichlet-process prior gives to positions,
+    (n, 2), by variational inference.
+    """
+    mixture: Any = scikit_learn().mixture
+    model = mixture.BayesianGaussianMixture(
+        n_components=min(MAX_COMPONENTS, len(positions_m)),
+        weight_concentration_prior_type="dirichlet_process",
+        max_iter=MAX_ITERATIONS,
+        random_state=0,
+    )
+    with warnings.catch_warnings():
+        # It warns if it has not converged after all iterations, and is taken as it is.
+        warnings.simplefilter("ignore")
+        labels = model.fit_predict(positions_m)
+
+    return np.asarray(labels, np.int64)
