@@ -26,7 +26,7 @@ from cogmap.services import registry
 from cogmap.services.epam.recognition.functions import function_of
 from cogmap.services.sim.layout import town
 from cogmap.services.sim.layout.catalogue import CATALOGUE
-from cogmap.services.workspace.config import Config as WorkspaceConfig
+from cogmap.services.workspace.ingress import RECOGNITION_THRESHOLD
 
 TOWNS = 4
 # After the towns of `python -m benchmarks perception`.
@@ -39,7 +39,7 @@ FOG_REACH_M = 40.0
 FOG_GREY = 190.0
 NOISE_SD = 4.0
 PERIOD_S = 0.4
-SURE = WorkspaceConfig().recognition_threshold
+SURE = RECOGNITION_THRESHOLD
 """With less evidence a view is ambiguous, and is not mapped by."""
 TRAINED = frozenset(kind.name for kind in CATALOGUE)
 

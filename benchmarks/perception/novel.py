@@ -9,9 +9,7 @@ from dataclasses import astuple, dataclass
 from benchmarks.perception.objects import Sight
 from benchmarks.perception.scenes import MIN_TURN_RAD, other_distance
 from cogmap.geometry.arrays import Floats
-from cogmap.services.workspace.config import Config
-
-RECOGNISED = Config().recognition_threshold
+from cogmap.services.workspace.ingress import RECOGNITION_THRESHOLD
 
 
 @dataclass(frozen=True)
@@ -53,9 +51,9 @@ def remembered(
 
     Each was to be met in the encounter of its number. Sides and distances are other than in that
     one, and in every other encounter that it was seen in. Its name is the first that it was
-    recognised by, with an activation over RECOGNISED. A building that they gave no name, or that of
-    a trained class or of another building, has none: no later sighting of it is right. Of later
-    sightings all count, however low their activation.
+    recognised by, with an activation over RECOGNITION_THRESHOLD. A building that they gave no
+    name, or that of a trained class or of another building, has none: no later sighting of it is
+    right. Of later sightings all count, however low their activation.
     """
     names: dict[int, str] = {}
     places = {number: [each.from_where[number]] for number, each in enumerate(encounters)}
@@ -68,7 +66,7 @@ def remembered(
     for meeting in encounters:
         for number, label, activation in _sightings(meeting):
             places[number].append(meeting.from_where[number])
-            if number in names or activation <= RECOGNISED:
+            if number in names or activation <= RECOGNITION_THRESHOLD:
                 continue
 
             is_taken = label in names.values()
