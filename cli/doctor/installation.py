@@ -1,4 +1,4 @@
-"""What is wrong with this installation."""
+"""Finds problems of this installation."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def examine(runs: Path) -> list[Finding]:
     return [
         *python_version(sys.version_info[:2]),
         *simulator(sys.version_info[:2], sys.platform, platform.machine()),
-        *dependencies(required(_requirements())),
+        *dependencies(required(declared())),
         *renderer(),
         *write_access(runs),
     ]
@@ -50,8 +50,8 @@ def simulator(version: tuple[int, int], system: str, machine: str) -> Iterator[F
         )
 
 
-def _requirements() -> list[str]:
-    """What the installed package declares that it needs."""
+def declared() -> list[str]:
+    """The requirements that the installed package declares."""
     try:
         return metadata.requires(PACKAGE) or []
     except metadata.PackageNotFoundError:
