@@ -4,6 +4,7 @@ Pure.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 
@@ -36,36 +37,54 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
     has that `pose`. One that is known here keeps its label; others get one that is free.
     """
     known = [node for node in graph.of_kind(Object) if node.map == ROOT_MAP]
-    labels = _labels(recalled, known, pose)
+    positions_m = np.array([(node.x_m, node.y_m) for node in known]).reshape(-1, 2)
+    here_m = transform_from(pose, positions_m).tolist()
+
+    # The label here of each: the one it is matched with, or that of the object of its look that
+    # stands there too; empty if there is none.
+    matched = {label for label in recalled.matched if label}
+    labels = []
+    for number, match in enumerate(recalled.matched):
+        label = match or _standing_there(recalled, number, known, here_m, matched)
+        matched.add(label)
+        labels.append(label)
+
     node_of = {node.label: node for node in known}
     taken = set(node_of) | {label for label in labels if label}
 
     operations: list[Operation] = []
     for number, label in enumerate(labels):
-        own = label or _free_label(recalled.labels[number], taken)
+        own = label
+        if not own:
+            look = look_of(recalled.labels[number])
+            names = (individual_label(look, each) for each in itertools.count(1))
+            own = next(name for name in names if name not in taken)
+
         taken.add(own)
-        node = _recalled_object(recalled, number, own, node_of.get(own), graph)
+        row = recalled.objects.numpy()[number].tolist()
+        here = node_of.get(own)
+        if here is None:
+            here = Object(id=object_id(own), label=own, x_m=0.0, y_m=0.0, last_seen_ns=NEVER_NS)
+
+        # It is as it was recalled, with what was learned of it in this run.
+        node = msgspec.structs.replace(
+            here,
+            base_level=1.0,
+            cycle=graph.cycle,
+            function=recalled.functions[number] or here.function,
+            x_m=row[RecalledColumn.X_M],
+            y_m=row[RecalledColumn.Y_M],
+            x_sd_m=row[RecalledColumn.X_SD_M],
+            y_sd_m=row[RecalledColumn.Y_SD_M],
+            width_m=row[RecalledColumn.WIDTH_M],
+            height_m=row[RecalledColumn.HEIGHT_M],
+            sightings=here.sightings + int(row[RecalledColumn.SIGHTINGS]),
+            offsets_m=None,
+        )
         place = nearest_place(node.x_m, node.y_m, graph.cell_m(ROOT_MAP))
         operations += [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
 
     return operations
-
-
-def _labels(recalled: Recollection, known: list[Object], pose: Floats) -> list[str]:
-    """The label here of each recalled object: the one it is matched with, or that of the object of
-    its look that stands there too; empty where there is none.
-    """
-    positions_m = np.array([(node.x_m, node.y_m) for node in known]).reshape(-1, 2)
-    here_m = transform_from(pose, positions_m).tolist()
-    taken = {label for label in recalled.matched if label}
-
-    labels = []
-    for number, matched in enumerate(recalled.matched):
-        label = matched or _standing_there(recalled, number, known, here_m, taken)
-        taken.add(label)
-        labels.append(label)
-
-    return labels
 
 
 def _standing_there(
@@ -90,38 +109,3 @@ def _standing_there(
             nearest_m = away_m
 
     return found
-
-
-def _free_label(label: str, taken: set[str]) -> str:
-    """The first label of a look that is not taken."""
-    number = 1
-    while individual_label(look_of(label), number) in taken:
-        number += 1
-
-    return individual_label(look_of(label), number)
-
-
-def _recalled_object(
-    recalled: Recollection, number: int, label: str, known: Object | None, graph: Graph
-) -> Object:
-    """A recalled object, with what was learned of it in this run."""
-    row = recalled.objects.numpy()[number].tolist()
-    sightings = int(row[RecalledColumn.SIGHTINGS])
-    node = known
-    if node is None:
-        node = Object(id=object_id(label), label=label, x_m=0.0, y_m=0.0, last_seen_ns=NEVER_NS)
-
-    return msgspec.structs.replace(
-        node,
-        base_level=1.0,
-        cycle=graph.cycle,
-        function=recalled.functions[number] or node.function,
-        x_m=row[RecalledColumn.X_M],
-        y_m=row[RecalledColumn.Y_M],
-        x_sd_m=row[RecalledColumn.X_SD_M],
-        y_sd_m=row[RecalledColumn.Y_SD_M],
-        width_m=row[RecalledColumn.WIDTH_M],
-        height_m=row[RecalledColumn.HEIGHT_M],
-        sightings=node.sightings + sightings,
-        offsets_m=None,
-    )
