@@ -107,7 +107,7 @@ def place_costs(
     is_obstacle = ground.is_obstacle()
     is_driven = ground.is_driven_over(is_obstacle)
     is_edge = ground.is_cut() & ~is_driven & ~is_obstacle
-    is_narrow = narrow(is_edge | is_obstacle, ground.grid.cell_m) & ~is_driven
+    is_narrow = narrow(is_obstacle, ground.grid.cell_m) & ~is_driven & ~is_edge
     is_blocked = is_edge | is_obstacle | is_narrow
     is_beside = ndimage.binary_dilation(is_blocked, SQUARE) & ~is_blocked
 
@@ -156,18 +156,18 @@ def extent_with(goals: Sequence[Goal], graph: Graph, map_id: str) -> Extent:
     return Extent((first_i, first_j), (last_i, last_j)).grown(MARGIN_CELLS)
 
 
-def narrow(is_blocked: Booleans, cell_m: float) -> Booleans:
-    """Mark the free places (w, h) between two blocked ones, if the robot is wider than a place."""
-    is_between = np.zeros_like(is_blocked)
+def narrow(is_obstacle: Booleans, cell_m: float) -> Booleans:
+    """Mark the free places (w, h) between two obstacles, if the robot is wider than a place."""
+    is_between = np.zeros_like(is_obstacle)
     if cell_m >= 2 * HALF_WIDTH_M:
         return is_between
 
-    around = np.pad(is_blocked, 1)
-    width, height = is_blocked.shape
+    around = np.pad(is_obstacle, 1)
+    width, height = is_obstacle.shape
     for di, dj in LINK_OFFSETS.tolist():
         one = around[1 + di : 1 + di + width, 1 + dj : 1 + dj + height]
         other = around[1 - di : 1 - di + width, 1 - dj : 1 - dj + height]
         is_between |= one & other
 
-    is_between &= ~is_blocked
+    is_between &= ~is_obstacle
     return is_between
