@@ -84,6 +84,13 @@ def _module() -> click.Command:
     return module
 
 
+def _new() -> click.Command:
+    """Write a first version of a codelet or a module."""
+    from cogmap.cli.new.command import new
+
+    return new
+
+
 def _router() -> click.Command:
     """Run the router that all modules connect to."""
     from cogmap.cli.processes import router
@@ -137,6 +144,7 @@ COMMANDS: dict[str, Loader] = {
     "log": _log,
     "memory": _memory,
     "module": _module,
+    "new": _new,
     "router": _router,
     "run": _run,
     "schemes": _schemes,

@@ -46,8 +46,7 @@ def sections(surveyed: bool) -> Sections:
         "kept_samples": 100,
         "landmark_samples": 1000,
         "correlated_views": 1.0,
-        "correlated_sightings": 1.0,
-        "landmark_sides": 1,
+        "landmarks": "points",
         "landmark_jitter_m": 0.003,
         "speed_gain_sd": SPEED,
         "turn_gain_sd": TURN,
@@ -61,7 +60,6 @@ def sections(surveyed: bool) -> Sections:
         "heading_variance_per_rad": TURN**2,
         # The whole path is evaluated.
         "sparse_after_s": NEVER_S,
-        "waiting_share": 0.0,
     }
 
     if surveyed:

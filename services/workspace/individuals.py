@@ -94,9 +94,9 @@ def as_entered(percepts: Percepts, graph: Graph) -> Percepts:
 
 def _is_not_elsewhere(agent: Self, stamp_ns: int) -> bool:
     """Whether it was found not long ago that the agent can be nowhere else on the map."""
-    if agent.not_elsewhere_ns == NEVER_NS:
+    if agent.misfits.not_elsewhere_ns == NEVER_NS:
         return False
-    return stamp_ns - agent.not_elsewhere_ns <= NOT_ELSEWHERE_NS
+    return stamp_ns - agent.misfits.not_elsewhere_ns <= NOT_ELSEWHERE_NS
 
 
 def _is_confirmed(candidates: Iterable[Candidate], agent: Self, graph: Graph) -> bool:
@@ -105,7 +105,7 @@ def _is_confirmed(candidates: Iterable[Candidate], agent: Self, graph: Graph) ->
         node = graph.get(Object, object_id(candidate.label))
         if node is None or not candidate.is_near:
             continue
-        if node.created_ns <= agent.last_fit_ns:
+        if node.created_ns <= agent.misfits.last_fit_ns:
             return True
 
     return False

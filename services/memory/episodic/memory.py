@@ -174,7 +174,7 @@ class EpisodicMemory:
                 self._episodes.reinforce(node.number, amount, broadcast.stamp_ns)
 
         agent = _agent_in(coalition)
-        if agent is None or agent.map != ROOT_MAP or agent.is_lost:
+        if agent is None or agent.map != ROOT_MAP or agent.misfits.is_lost:
             return
 
         at_m = (agent.x_m, agent.y_m)

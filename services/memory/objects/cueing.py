@@ -61,7 +61,7 @@ class ObjectCues:
         """Where the agent knows to be, and where what was broadcast before `cycle` stands."""
         places_m = []
         agent = self._graph.agent
-        if agent is not None and agent.map == ROOT_MAP and not agent.is_lost:
+        if agent is not None and agent.map == ROOT_MAP and not agent.misfits.is_lost:
             places_m.append((agent.x_m, agent.y_m))
 
         names = {name for number, name in self._conscious if number < cycle}

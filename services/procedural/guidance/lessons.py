@@ -29,8 +29,8 @@ class Place(NamedTuple):
     @staticmethod
     def of(agent: Self) -> Place:
         """That of a self node."""
-        at_m = complex(agent.odometry_x_m, agent.odometry_y_m)
-        return Place(at_m, agent.odometry_heading_rad)
+        at_m = complex(agent.odometry.x_m, agent.odometry.y_m)
+        return Place(at_m, agent.odometry.heading_rad)
 
     def to(self, other_m: complex) -> complex:
         """Another position, metres ahead + metres left x i as seen from here."""

@@ -13,7 +13,7 @@ from cogmap.schemas.nodes import Object, Self
 from cogmap.services.codelets.config import Config
 from tests.support.world.scenes import graph_of, landmark, run, task
 
-EXACT = Config(samples=4000, kept_samples=2000, outlier_share=1e-9, correlated_views=1.0)
+EXACT = Config(samples=4000, kept_samples=2000, correlated_views=1.0)
 Row = tuple[float, float, float, float, float]
 
 

@@ -6,13 +6,14 @@ import msgspec
 import numpy as np
 
 from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import NoSettings
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Cells, Operation
 from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn, coarse_map_id
-from cogmap.services.codelets.sub_maps.coarse_places import Config, run
+from cogmap.services.codelets.sub_maps.coarse_places import EVERY_CYCLES, run
 from tests.support.world.scenes import agent, graph_of, task
 
-CONFIG = Config()
+CONFIG = NoSettings()
 FINER, COARSEST = coarse_map_id(1), coarse_map_id(2)
 
 
@@ -31,7 +32,7 @@ def _coarsened(*operations: Operation, updates: int = 1) -> Graph:
     graph = graph_of(agent(), *operations)
     asked = task("coarse_places")
     for number in range(updates + 1):
-        each = msgspec.structs.replace(asked, cycle=number * CONFIG.every_cycles)
+        each = msgspec.structs.replace(asked, cycle=number * EVERY_CYCLES)
         graph.change(run(each, graph, CONFIG).operations)
     return graph
 
