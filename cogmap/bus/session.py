@@ -52,7 +52,9 @@ def free_endpoint() -> str:
 
 
 def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Session:
-    """Return a session with the router at `endpoint`. Raises NoRouterError if none answers in time."""
+    """Return a session with the router at `endpoint`. Raises NoRouterError if none
+    answers in time.
+    """
     _address(endpoint)
     settings = {
         "connect/endpoints": [endpoint],

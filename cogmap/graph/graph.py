@@ -115,7 +115,9 @@ class Graph:
         return node if isinstance(node, kind) else None
 
     def of_kind(self, kind: type[K]) -> Iterator[K]:
-        """Return all nodes of a kind, by id. Of a kind that is not indexed it searches every node."""
+        """Return all nodes of a kind, by id. Of a kind that is not indexed it searches
+        every node.
+        """
         names = self._by_kind.get(kind, self.nodes)
 
         for name in sorted(names):

@@ -127,7 +127,9 @@ class PlaceGrid:
             yield self.message(key)
 
     def message(self, key: TileKey) -> PlaceTile:
-        """Return one tile as it travels. Its arrays share memory with the tile: encode it at once."""
+        """Return one tile as it travels. Its arrays share memory with the tile: encode it
+        at once.
+        """
         map_id, x, y = key
         tile = self.tiles[key]
         columns = {name: Array.of(tile.columns[name]) for name in sorted(tile.columns)}
@@ -150,7 +152,9 @@ class PlaceGrid:
                 yield key, self.tiles[key]
 
     def written_cells(self, map_id: str, column: PlaceColumn) -> tuple[Indices, Floats]:
-        """Return the cells of a map whose value in a column is not 0, (k, 2), and the values, (k,)."""
+        """Return the cells of a map whose value in a column is not 0, (k, 2), and the
+        values, (k,).
+        """
         cells = [np.zeros((0, 2), np.int64)]
         values = [np.zeros(0)]
         for (_, x, y), tile in self.of_map(map_id):

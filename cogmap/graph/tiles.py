@@ -75,7 +75,9 @@ def positions_in(extent: Extent) -> Iterator[tuple[int, int]]:
 
 
 def overlap(x: int, y: int, extent: Extent) -> tuple[Slices, Slices]:
-    """Return the cells of tile (x, y) that lie in `extent`: within the tile, and within the extent."""
+    """Return the cells of tile (x, y) that lie in `extent`: within the tile, and within
+    the extent.
+    """
     inside = []
     within = []
     for number, lower, upper in zip((x, y), extent.lower, extent.upper, strict=True):

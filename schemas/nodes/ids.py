@@ -51,7 +51,9 @@ def feeling_id(name: str) -> str:
 
 
 def relation_id(side: Side, look: str) -> str:
-    """Return the id of the relation of standing next to what perception calls `look`, on that side."""
+    """Return the id of the relation of standing next to what perception calls `look`, on
+    that side.
+    """
     return f"{RELATION}{side}:{look}"
 
 

@@ -52,7 +52,9 @@ class FootprintProblem:
         )
 
     def copies(self) -> FootprintProblem:
-        """Return the problem as `linearized` takes it: once as it is, and once for each derivative."""
+        """Return the problem as `linearized` takes it: once as it is, and once for each
+        derivative.
+        """
         every_row = np.arange(len(self.slope))
         return self.take(np.tile(every_row, 1 + len(STEPS)))
 
