@@ -16,7 +16,7 @@ from benchmarks.map_correction.files import read_truth
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
 from benchmarks.trajectory import trajectory_error_m
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.errors import UsageError
 from cogmap.estimation.gnc import inliers
 from cogmap.estimation.least_squares import optimize

@@ -41,8 +41,12 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     """When a need is high."""
 
     high_level: Annotated[
-        PositiveShare, Meta(description="Level from which on a need is high, above 0 to 1.")
-    ] = 0.5
+        PositiveShare,
+        Meta(
+            description="Level from which on a need is high: what is left then must suffice for "
+            "the way to what satisfies it, which may be far longer than straight."
+        ),
+    ] = 0.4
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:

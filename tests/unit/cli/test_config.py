@@ -20,12 +20,10 @@ CYCLES_PER_S = 5
 # or by the broadcast, here.
 LIDA = {
     "global_workspace.no_broadcast_ticks": 100,
-    "global_workspace.no_new_coalition_ticks": 50,
     "global_workspace.aggregate_above": 0.8,
     "global_workspace.coalition_above": 0.5,
     "global_workspace.refractory_ticks": 40,
-    "global_workspace.decay": 0.1,
-    "global_workspace.ticks_per_decay": 1,
+    "global_workspace.decay": 0.1 * TICKS_PER_CYCLE,
     "workspace.decay": 0.1 * TICKS_PER_CYCLE,
     "workspace.base_level_decay": 0.1 * TICKS_PER_CYCLE,
     "workspace.place_decay": 0.1 * TICKS_PER_CYCLE,
@@ -41,16 +39,9 @@ LIDA = {
     "action.selector": "behaviour_net",
     "action.selection_threshold": 0.9,
     "action.threshold_fall": 0.1,
-    "action.broadcast_excitation": 0.05,
-    "action.successor_excitation": 0.04,
-    "action.predecessor_excitation": 0.1,
-    "action.conflictor_inhibition": 0.04,
-    "action.net_decay": 0.1 * TICKS_PER_CYCLE,
     "memory.sparse.kind": "binary",
     "memory.sparse.hard_locations": 10_000,
     "memory.sparse.dimensions": 1024,
-    "memory.sparse.activated_share": 0.001,
-    "memory.sparse.max_reads": 19,
     "memory.episodic.decay_per_h": "hours, up to a day",
 }
 

@@ -1,0 +1,157 @@
+"""What `cogmap run` does once its options are read."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import click
+import msgspec
+from rich.console import Console
+
+from cogmap.bus.session import check_free
+from cogmap.cli import BEGAN_S
+from cogmap.cli.launch.display import Display, display_on
+from cogmap.cli.launch.drive import Drive
+from cogmap.cli.launch.forking.client import ForkServer
+from cogmap.cli.launch.plan import CONFIG_NAME, Choices, effective
+from cogmap.cli.run import summary
+from cogmap.cli.run.checks import check_inputs
+from cogmap.cli.run.options import AROUND_S, LAP_LIMIT_S
+from cogmap.errors import ConfigError, StorageError
+from cogmap.runtime.config import Sections
+from cogmap.runtime.process import Stop
+from cogmap.services.sim.layout.towns import BLOCKS, LOOP, OSM
+
+RUNS = Path("runs")
+FINISH_S = 4.0
+
+
+@dataclass(frozen=True)
+class Start:
+    """What the options of `cogmap run` ask for: `given` are the settings, `out` the folder of its
+    files, a new one of RUNS where it is None, and without `time_limit_s` it is the default.
+    """
+
+    choices: Choices
+    given: Sections
+    endpoint: str
+    agent: str
+    out: Path | None
+    time_limit_s: float | None
+    as_json: bool
+
+
+def run_drive(start: Start, server: ForkServer | None) -> int:
+    """Drive, and print the summary. Returns the exit code; `server` forks the processes.
+
+    Raises UsageError where it cannot be done so, and StorageError where a file cannot be written.
+    """
+    stop = Stop()
+    choices = start.choices
+    console = Console(stderr=start.as_json)
+    sections = effective(start.given, choices, observer=True)
+    check_inputs(sections, choices)
+    if choices.own_router:
+        check_free(start.endpoint)
+
+    folder = _new_folder(start.out)
+    drive = Drive(folder, start.endpoint, start.agent, choices, sections, BEGAN_S, server)
+    limit_s = start.time_limit_s or default_limit_s(sections["sim"], choices)
+    screen = display_on(console)
+    _introduce(screen, drive)
+    with _writing(folder):
+        try:
+            watch, ending = drive.run(BEGAN_S + limit_s - FINISH_S, stop, screen)
+        finally:
+            screen.close()
+        metrics = summary.finish(drive, watch, ending)
+
+    if start.as_json:
+        click.echo(msgspec.json.encode(metrics))
+    else:
+        console.print(summary.table(metrics, folder))
+    return ending.outcome.exit_code
+
+
+def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
+    """The time limit of a drive with these settings of the simulation.
+
+    It grows with each lap, and is one lap's at least; without laps it is the drive's duration, and
+    time to start and to end.
+    """
+    has_laps = not (choices.tour or choices.goals or choices.explore_s)
+    if sim["town"] == LOOP and has_laps:
+        return LAP_LIMIT_S * max(1.0, choices.laps or 1.0)
+
+    return float(sim["duration_s"]) + AROUND_S
+
+
+def _introduce(screen: Display, drive: Drive) -> None:
+    screen.show(f"{_town(drive)}, files in {drive.folder}")
+    if drive.goals:
+        order = "in order" if drive.sections["workspace"]["in_order"] else "in an order of its own"
+        explore_s = drive.choices.explore_s
+        if explore_s is not None:
+            screen.show(f"the agent explores the town for {explore_s:g} s")
+        screen.show(f"its goals, {order}: {drive.goals}")
+    if not drive.choices.without:
+        return
+
+    names = ", ".join(drive.choices.without)
+    config_path = drive.folder / CONFIG_NAME
+    screen.show(f"start {names} yourself with --connect {drive.endpoint} --config {config_path}")
+
+
+def _town(drive: Drive) -> str:
+    """The town of a drive, in words."""
+    sim = drive.sections["sim"]
+    if sim["town"] == LOOP:
+        return f"town {sim['seed']}"
+    if sim["town"] == BLOCKS:
+        return f"town {sim['seed']} of blocks"
+
+    return f"the town in {sim['town'].removeprefix(OSM)}"
+
+
+def _new_folder(out: Path | None) -> Path:
+    """`out`, or a folder of RUNS named after the time, which RUNS/latest then links to. Raises
+    ConfigError where it exists or cannot be made.
+    """
+    folder = out or RUNS / time.strftime("%Y-%m-%d-%H%M%S")
+    try:
+        folder.mkdir(parents=True)
+        if out is None:
+            _link_latest(folder)
+    except FileExistsError:
+        raise ConfigError(f"{folder} exists already: name another with --out") from None
+    except OSError as error:
+        raise ConfigError(
+            f"cannot make the folder {folder} ({error.strerror}): name another with --out"
+        ) from None
+    return folder
+
+
+def _link_latest(folder: Path) -> None:
+    """Let the link `latest` beside `folder` lead to it, at no moment nowhere."""
+    latest = folder.with_name("latest")
+    new = folder.with_name(f".latest-{folder.name}")
+    new.symlink_to(folder.name)
+    new.replace(latest)
+
+
+@contextmanager
+def _writing(folder: Path) -> Iterator[None]:
+    """Raise StorageError where a file of `folder` cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        path = error.filename or folder
+        raise StorageError(
+            f"cannot write {path} ({error.strerror}): make room on its disk, "
+            "or name another folder with --out"
+        ) from error
