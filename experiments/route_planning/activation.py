@@ -36,7 +36,7 @@ def free_ground() -> Spread:
 
 
 def walled_ground() -> Spread:
-    """The links across WALLS have the weight 0."""
+    """Return the links across WALLS have the weight 0."""
     is_free = np.ones((SIDE, SIDE), bool)
     for (first_i, first_j), (last_i, last_j) in WALLS:
         is_free[first_i : last_i + 1, first_j : last_j + 1] = False
