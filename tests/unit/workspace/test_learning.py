@@ -17,13 +17,10 @@ from cogmap.schemas.nodes import (
     attention_id,
     object_id,
 )
-from cogmap.services.workspace.config import Config
-from cogmap.services.workspace.learning.base_level import learned_operations, risen
+from cogmap.services.workspace.learning.base_level import learned_operations
 from tests.support.world.scenes import Desk, agent, graph_of, landmark, motion, percept, percepts
 
 CONSCIOUS = Run(lockstep=True, participants={"global_workspace": 1})
-LINEAR = Config(learning_rate=0.1, unlearning_rate=0.4)
-SIGMOID = Config(learning_rate=0.1, learning="sigmoid")
 
 
 def _broadcast(
@@ -33,9 +30,9 @@ def _broadcast(
     return Broadcast(cycle=cycle, trigger=Trigger.ONE_COALITION, coalition=coalition)
 
 
-def _learned(node: AnyNode, told: AnyNode, config: Config = LINEAR) -> list[AnyNode]:
+def _learned(node: AnyNode, told: AnyNode) -> list[AnyNode]:
     graph = graph_of(node)
-    return learned_operations([_broadcast(told)], graph, 1, config)  # type: ignore[return-value]
+    return learned_operations([_broadcast(told)], graph, 1)  # type: ignore[return-value]
 
 
 def test_what_was_conscious_has_a_higher_base_level() -> None:
@@ -55,7 +52,7 @@ def test_what_is_persistent_or_forgotten_learns_nothing() -> None:
 def test_two_broadcasts_teach_twice() -> None:
     house = landmark("house", base_level=0.2)
     both = [_broadcast(house, cycle=1), _broadcast(house, cycle=2)]
-    (learned,) = learned_operations(both, graph_of(house), 3, LINEAR)
+    (learned,) = learned_operations(both, graph_of(house), 3)
 
     assert isinstance(learned, Object)
     assert learned.base_level == pytest.approx(0.4)
@@ -64,7 +61,7 @@ def test_two_broadcasts_teach_twice() -> None:
 def test_activation_decays_as_it_would_have() -> None:
     node = Node(id="a", kind="thing", activation=0.5, base_level=0.5, cycle=1)
     rates = Decay(activation=0.1, base_level=0.01)
-    (learned,) = learned_operations([_broadcast(node)], graph_of(rates, node), 3, LINEAR)
+    (learned,) = learned_operations([_broadcast(node)], graph_of(rates, node), 3)
 
     assert isinstance(learned, Node)
     assert (learned.activation, learned.cycle) == (pytest.approx(0.3), 3)
@@ -75,7 +72,7 @@ def test_what_is_broadcast_as_missing_is_unlearned() -> None:
     house = landmark("house", base_level=0.9)
     missing = msgspec.structs.replace(house, salience=-1.0)
     told = _broadcast(missing, feeling=Feeling.SURPRISE)
-    (learned,) = learned_operations([told], graph_of(house), 1, LINEAR)
+    (learned,) = learned_operations([told], graph_of(house), 1)
 
     assert isinstance(learned, Object)
     assert learned.base_level == pytest.approx(0.5)
@@ -86,25 +83,16 @@ def test_what_is_dangerous_is_learned_as_what_is_not() -> None:
     house = landmark("house", base_level=0.2)
     dangerous = msgspec.structs.replace(house, salience=-1.0)
     told = _broadcast(dangerous, feeling=Feeling.DANGER)
-    (learned,) = learned_operations([told], graph_of(house), 1, LINEAR)
+    (learned,) = learned_operations([told], graph_of(house), 1)
 
     assert isinstance(learned, Object)
     assert learned.base_level == pytest.approx(0.3)
 
 
-def test_a_sigmoid_learns_most_in_the_middle_and_never_reaches_one() -> None:
-    gains = [risen(level, SIGMOID) - level for level in (0.05, 0.5, 0.95)]
-
-    assert gains[1] == pytest.approx(0.1, abs=0.01)
-    assert max(gains) == gains[1]
-    assert 0.95 < risen(0.95, SIGMOID) < 1.0
-    assert risen(0.95, LINEAR) == 1.0
-
-
 def test_the_codelet_of_a_broadcast_keeps_that_it_was_conscious() -> None:
     memory = Attention(id=attention_id("novelty"), codelet="novelty", brought_cycle=4)
     told = _broadcast(agent(), cycle=5, codelet="novelty")
-    (learned,) = learned_operations([told], graph_of(memory), 6, LINEAR)
+    (learned,) = learned_operations([told], graph_of(memory), 6)
 
     assert learned == msgspec.structs.replace(memory, conscious_cycle=5)
 

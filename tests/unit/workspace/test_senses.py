@@ -13,11 +13,12 @@ from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.sensing import RangeScan
+from cogmap.services.workspace.senses import MAX_SCAN_AGE_NS
 from tests.support.world.scenes import Desk, motion, percepts, stamp_ns
 
 RAYS = ((0.1, 5.0), (0.0, 0.0))
 SCANNED = Run(lockstep=True, participants={"sim": 1})
-LATE_MS = 30
+LATE_MS = MAX_SCAN_AGE_NS // 1_000_000
 
 
 def _scan(frame: int, rays: Sequence[Sequence[float]] = RAYS, late_ms: float = 0) -> RangeScan:
@@ -59,7 +60,7 @@ def stepped() -> Desk:
 @pytest.fixture
 def timely() -> Desk:
     """In real time."""
-    return Desk("w1", run=REAL_TIME, max_scan_age_ms=LATE_MS)
+    return Desk("w1", run=REAL_TIME)
 
 
 def test_in_lockstep_a_cycle_waits_for_the_scan_of_its_view(stepped: Desk) -> None:
