@@ -19,7 +19,11 @@ def named(names: Iterable[str]) -> list[Topic]:
     found = []
     for name in names:
         if name not in topics.BY_NAME:
-            raise UsageError(f"no topic {name!r}: {_hint(name)}")
+            close = difflib.get_close_matches(name, topics.BY_NAME, 1)
+            known = f"there are {', '.join(sorted(topics.BY_NAME))}"
+            raise UsageError(
+                f"no topic {name!r}: {f'did you mean {close[0]}?' if close else known}"
+            )
         found.append(topics.BY_NAME[name])
     return found
 
@@ -55,10 +59,3 @@ def to_record(names: Iterable[str] = (), regex: str = "", exclude: str = "") -> 
             "no topic is left to record: name some, or leave --regex and --exclude out"
         )
     return chosen
-
-
-def _hint(name: str) -> str:
-    close = difflib.get_close_matches(name, topics.BY_NAME, 1)
-    if close:
-        return f"did you mean {close[0]}?"
-    return f"there are {', '.join(sorted(topics.BY_NAME))}"

@@ -117,7 +117,7 @@ def environments(city: City, number: int, seed: int) -> list[Environment]:
 def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> list[int] | None:
     """Eight buildings in a square of random size at a random place, none too near to another.
 
-    None where MAX_TRIES squares have none.
+    None if MAX_TRIES squares have none.
     """
     if len(usable) < BUILDINGS:
         return None

@@ -80,7 +80,7 @@ def _pieces(segments_m: Floats) -> Floats:
 
 def _shares_along(lines_m: Floats, others_m: Floats) -> Floats:
     """(k,): how far along each of (k, 2, 2) lines the other of its pair crosses it, 0 to 1; nan
-    where it does not.
+    if it does not.
     """
     along_m = lines_m[:, 1] - lines_m[:, 0]
     other_m = others_m[:, 1] - others_m[:, 0]

@@ -67,7 +67,7 @@ class MostActive:
 
 @dataclass(frozen=True)
 class Selection:
-    """The behaviour that was chosen, None where none was active enough, all that were considered,
+    """The behaviour that was chosen, None if none was active enough, all that were considered,
     the chosen one included, and the threshold of the next selection.
     """
 

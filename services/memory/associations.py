@@ -50,7 +50,7 @@ class Associations:
         return [name for name, _ in sorted(votes.items(), key=lambda vote: (-vote[1], vote[0]))]
 
     def _map_of(self, cue: Bytes) -> str | None:
-        """The map of the stored object that a cue recalls; None where it recalls none."""
+        """The map of the stored object that a cue recalls; None if it recalls none."""
         recall = self._memory.read(cue)
         if recall is None:
             return None

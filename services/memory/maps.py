@@ -73,7 +73,7 @@ class RememberedMaps:
         return [] if forgotten is None else forgotten.keys
 
     def get(self, name: str) -> RememberedMap | None:
-        """The map of that name; None where there is none."""
+        """The map of that name; None if there is none."""
         return self._maps.get(name)
 
     def others(self, name: str) -> list[RememberedMap]:

@@ -160,7 +160,7 @@ class LongTermMemory:
 
     def _recall(self, cycle: int, stamp_ns: int) -> list[Message]:
         """An offer of the map, the episode and the objects that are recalled; in lockstep, of
-        nothing where none is.
+        nothing if none is.
         """
         operations: list[Operation] = []
         if cycle % self._config.recall_cycles == 0:

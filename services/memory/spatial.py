@@ -157,7 +157,7 @@ class SpatialMemory:
 
     @property
     def _joined(self) -> str:
-        """The name of the map that was joined to the root map; empty where none was."""
+        """The name of the map that was joined to the root map; empty if none was."""
         root = self._graph.get(Map, ROOT_MAP)
         return "" if root is None else root.remembered
 

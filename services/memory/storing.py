@@ -78,7 +78,7 @@ class ChangedPlaces:
 
 
 def stored_objects(name: str, objects: Iterable[Object], graph: Graph) -> list[StoredRecord]:
-    """The record of the objects of the map that is called `name`; none where there are none."""
+    """The record of the objects of the map that is called `name`; none if there are none."""
     known = sorted(objects, key=lambda node: node.id)
     if not known:
         return []
@@ -108,7 +108,7 @@ def stored_objects(name: str, objects: Iterable[Object], graph: Graph) -> list[S
 
 def stored_tree(name: str, objects: Iterable[Object], graph: Graph) -> list[StoredRecord]:
     """The record of the sub-maps that have some of the objects of the map that is called `name`;
-    none where there are none.
+    none if there are none.
     """
     members: dict[str, list[str]] = {}
     for label in sorted(node.label for node in objects):

@@ -32,13 +32,13 @@ class Execution:
 
     @property
     def executed(self) -> MotorProgram:
-        """The program that was started last. Raises MessageError where none was."""
+        """The program that was started last. Raises MessageError if none was."""
         if self._executed is None:
             raise MessageError("no motor program was started yet")
         return self._executed
 
     def start(self, program: MotorProgram) -> None:
-        """Execute a program, from its beginning. Raises MessageError where there is none."""
+        """Execute a program, from its beginning. Raises MessageError if there is none."""
         before = self._program
         self._program = self._program_of(program.action, program.parameters)
         if isinstance(self._program, Guide) and isinstance(before, Guide):
@@ -46,14 +46,14 @@ class Execution:
         self._executed = program
 
     def put(self, action: Action) -> None:
-        """Keep an action until it counts. Raises MessageError where it has no motor program."""
+        """Keep an action until it counts. Raises MessageError if it has no motor program."""
         if action.scheme:
             self._program_of(action.action, action.parameters)
         self._actions.append(action)
 
     def started(self, answered_cycle: int, waiting_cycle: int | None) -> list[MotorProgram]:
         """The programs that start now, after the command of `answered_cycle`, with a pose of
-        `waiting_cycle` to answer next, None where none has come.
+        `waiting_cycle` to answer next, None if none has come.
         """
         started = []
         waiting = []

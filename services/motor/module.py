@@ -77,7 +77,7 @@ class MotorModule:
                 self._is_resumed = True
 
     def executed(self) -> MotorProgram:
-        """The program that is executed. Raises MessageError where none was yet."""
+        """The program that is executed. Raises MessageError if none was yet."""
         return self._execution.executed
 
     def on_clock(self, clock: Clock) -> MotorCommand | None:
@@ -158,7 +158,7 @@ class MotorModule:
         return self._replies()
 
     def on_action(self, action: Action) -> list[Message]:
-        """Start the motor program of an action. Raises MessageError where there is none.
+        """Start the motor program of an action. Raises MessageError if there is none.
 
         After a restart, actions come again that were executed already.
         """

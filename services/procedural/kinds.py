@@ -48,7 +48,7 @@ class NodeKinds:
         return sorted(self._types)
 
     def fields(self, kind: str) -> list[str] | None:
-        """The fields of a kind; None where it may have any."""
+        """The fields of a kind; None if it may have any."""
         if self._types[kind] is Node:
             return None
         return [field.encode_name for field in msgspec.structs.fields(self._types[kind])]
@@ -58,11 +58,11 @@ class NodeKinds:
         return self._known[meaning]
 
     def meaning(self, kind: str, field: str) -> str:
-        """What the words of a field stand for, NEED or FUNCTION; empty where they may be any."""
+        """What the words of a field stand for, NEED or FUNCTION; empty if they may be any."""
         return _MEANING.get((kind, field), "")
 
     def scalar(self, kind: str, field: str) -> type | None:
-        """The type of a field, of an enumeration that of its values; None where it is no scalar, or
+        """The type of a field, of an enumeration that of its values; None if it is no scalar, or
         may be any.
         """
         if self.fields(kind) is None:
@@ -74,7 +74,7 @@ class NodeKinds:
     def value(self, kind: str, field: str, value: Any) -> Scalar:
         """A value of a field, of its type: of an enumeration also by the name of a member.
 
-        Raises ValueError where it is no such value.
+        Raises ValueError if it is no such value.
         """
         if self.fields(kind) is not None:
             fields = msgspec.structs.fields(self._types[kind])

@@ -133,7 +133,7 @@ class ProceduralMemory:
 
 
 def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
-    """The module `procedural`. Raises ConfigError where its schemes cannot be used."""
+    """The module `procedural`. Raises ConfigError if its schemes cannot be used."""
     graph = Graph(with_places=False)
     memory = ProceduralMemory(config, graph, run)
     published = [topics.BEHAVIOURS]

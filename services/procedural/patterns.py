@@ -64,8 +64,8 @@ class Condition:
 
 @dataclass(frozen=True)
 class Pattern:
-    """Nodes of a kind of which conditions hold. Where it has a `variable`, that stands for the id
-    of the node that matches, in all patterns of a scheme. Where it has `feelings`, the node is
+    """Nodes of a kind of which conditions hold. If it has a `variable`, that stands for the id
+    of the node that matches, in all patterns of a scheme. If it has `feelings`, the node is
     broadcast with one of them.
     """
 
@@ -75,7 +75,7 @@ class Pattern:
     feelings: tuple[Feeling, ...] = ()
 
     def match(self, nodes: Iterable[Active], bindings: Bindings) -> Active | None:
-        """The most active node that matches, of equals the first by id; None where none does."""
+        """The most active node that matches, of equals the first by id; None if none does."""
         wanted = bindings.get(self.variable)
         found = []
         for active in nodes:

@@ -41,7 +41,7 @@ class Source:
         table: str = SCHEME,
     ) -> ConfigError:
         """An error about a word in the scheme of that number, from 0, among those of a table of
-        TOML; None where it is in none.
+        TOML; None if it is in none.
         """
         bounds = [*self._headers, len(self._lines)]
         headers = self._of_table.get(table, [])

@@ -105,7 +105,7 @@ class Ledger:
             self._reasons.append(reason[:MAX_REASON_CHARACTERS])
 
     def check(self, proposal: Proposal) -> set[Key]:
-        """The columns of tiles that `proposal` writes. Raises MessageError where it is not valid,
+        """The columns of tiles that `proposal` writes. Raises MessageError if it is not valid,
         stating why.
         """
         name = f"proposal {proposal.task_id}"
@@ -133,7 +133,7 @@ class Ledger:
         return columns
 
     def check_offer(self, offer: Offer, writer: Writer) -> None:
-        """Raise MessageError where an offer writes what may not be offered."""
+        """Raise MessageError if an offer writes what may not be offered."""
         name = f"offer {offer.seq} of {offer.source}"
         for operation in offer.operations:
             check_operation(name, operation, self.graph, writer)

@@ -42,7 +42,7 @@ OFFERING = ("memory", "motor")
 MAX_LATE_TASKS = 256
 PHASES = (Phase.CORRECTION, Phase.LOCALIZATION, Phase.OBJECTS, Phase.ATTENTION)
 LANES_BEGIN = Phase.ATTENTION
-# Where a cycle goes on after a commit of each phase; lanes are committed after the last one.
+# Where a cycle continues after a commit of each phase; lanes are committed after the last one.
 PLACE_OF = {phase: place for place, phase in enumerate(PHASES)} | {
     Phase.BACKGROUND: len(PHASES) - 1
 }
@@ -95,7 +95,7 @@ class Workspace:
     def snapshot(self, request: SnapshotRequest | None = None) -> Snapshot:
         """The whole graph.
 
-        Raises MessageError where `request` asks for a version that is not committed yet.
+        Raises MessageError if `request` asks for a version that is not committed yet.
         """
         graph = self._ledger.graph
         if request is not None and request.at_least > graph.version:
@@ -153,7 +153,7 @@ class Workspace:
     def on_proposal(self, proposal: Proposal) -> list[Message]:
         """Collect an answer.
 
-        One that comes after its cycle has ended is committed now if it still applies. Where it does
+        One that comes after its cycle has ended is committed now if it still applies. If it does
         not, it is rejected, and the next delta counts it.
         """
         if self._dispatch.answer(proposal) or self._lanes.answer(proposal):

@@ -50,7 +50,7 @@ class Dispatch:
         self._leases: dict[str, Lease] = {}
 
     def begin(self, tasks: list[Task], now_ns: int) -> list[Message]:
-        """Add `tasks`; what is to be published now. Where there is no worker they wait for one."""
+        """Add `tasks`; what is to be published now. If there is no worker they wait for one."""
         for task in tasks:
             self._leases[task.task_id] = Lease(task, now_ns)
 
@@ -88,7 +88,7 @@ class Dispatch:
     def answer(self, proposal: Proposal) -> bool:
         """Take a proposal.
 
-        False where none is expected: the task was answered before, or is of another time.
+        False if none is expected: the task was answered before, or is of another time.
         """
         lease = self._leases.get(proposal.task_id)
         if lease is None or not lease.is_open:

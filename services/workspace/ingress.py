@@ -101,7 +101,7 @@ def first_goals(config: Config, before_ns: int, now_ns: int) -> list[Goal]:
 
 
 def check_percepts(percepts: Percepts) -> None:
-    """Raise MessageError where points of the road or its boundary are not (n, 2)."""
+    """Raise MessageError if points of the road or its boundary are not (n, 2)."""
     for name, points_m in (("road", percepts.road_m), ("boundary", percepts.road_boundary_m)):
         if len(points_m.shape) != 2 or points_m.shape[1] != 2:
             raise MessageError(f"{name} points of shape {points_m.shape}")

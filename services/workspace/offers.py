@@ -78,7 +78,7 @@ def _with_objects(
     operations: list[Operation], ledger: Ledger, entering: list[Operation]
 ) -> list[Operation]:
     """`operations`, with each object at its place node, without those that are on the map already:
-    their label is taken, perhaps by what is seen right now, or one of their look stands there.
+    their label is taken, perhaps by what is seen right now, or one of their look is at that place.
     """
     graph = ledger.graph
     taken = {each.id for each in entering if isinstance(each, GraphNode)} | graph.nodes.keys()

@@ -67,7 +67,7 @@ def written_by(operation: Operation) -> Iterable[Key]:
 
 
 def check_operation(name: str, operation: Operation, graph: Graph, writer: Writer) -> None:
-    """Raise MessageError where `writer` may not carry out `operation`, `name` being what asks."""
+    """Raise MessageError if `writer` may not carry out `operation`, `name` being what asks."""
     if isinstance(operation, PlaceTile | Decay):
         kind = type(operation).__name__
         raise MessageError(f"{name}: {kind} is the workspace's own to write")

@@ -29,7 +29,7 @@ class SelfMotions:
         self._motions: list[SelfMotion] = []
 
     def put(self, motion: SelfMotion, moved_ns: int) -> None:
-        """Keep self-motion, once, where it is newer than `moved_ns`. Raises MessageError where its
+        """Keep self-motion, once, where it is newer than `moved_ns`. Raises MessageError if its
         rows are of another shape or dtype.
         """
         shape = motion.motions.shape
@@ -80,7 +80,7 @@ class Scans:
         self._missed_ns = -1
 
     def put(self, scan: RangeScan) -> None:
-        """Keep a scan. Raises MessageError where it is of another shape or dtype, has a range
+        """Keep a scan. Raises MessageError if it is of another shape or dtype, has a range
         below 0, or comes after the cycle of its view has begun without it.
         """
         bearing_rad = scan.bearing_rad
@@ -109,7 +109,7 @@ class Scans:
         return not self._awaited or stamp_ns in self._scans
 
     def take(self, stamp_ns: int) -> RangeScan | None:
-        """The scan for the cycle of the view at `stamp_ns`; None where there is none."""
+        """The scan for the cycle of the view at `stamp_ns`; None if there is none."""
         until_view = [known_ns for known_ns in self._scans if known_ns <= stamp_ns]
         newest_ns = max(until_view, default=-1)
         is_missed = newest_ns != stamp_ns
@@ -171,11 +171,11 @@ class Sensed:
         self._body = Body(run)
 
     def put_motion(self, motion: SelfMotion, moved_ns: int) -> None:
-        """Keep self-motion. Raises MessageError where its rows are of another shape or dtype."""
+        """Keep self-motion. Raises MessageError if its rows are of another shape or dtype."""
         self._motions.put(motion, moved_ns)
 
     def put_scan(self, scan: RangeScan) -> None:
-        """Keep a range scan. Raises MessageError where it is none, or too late."""
+        """Keep a range scan. Raises MessageError if it is none, or too late."""
         self._scans.put(scan)
 
     def put_energy(self, energy: Energy) -> None:

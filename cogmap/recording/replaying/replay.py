@@ -41,7 +41,10 @@ def replay_into(
     """
     began_s = time.perf_counter()
     reader = LogReader(path)
-    sections = _merged(recorded_config(reader), overrides or {})
+    sections = {name: dict(section) for name, section in recorded_config(reader).items()}
+    for name, section in (overrides or {}).items():
+        sections.setdefault(name, {}).update(section)
+
     todo = jobs(reader, list(dict.fromkeys(modules)))
     work = partial(run_job, path=path, build=build, sections=sections)
     if processes is None:
@@ -69,14 +72,6 @@ def run_job(job: Job, path: Path, build: Build, sections: Sections) -> Outcome:
     outcome = ModuleRun(LogReader(path), job, module).replay()
     outcome.busy_s = time.perf_counter() - began_s
     return outcome
-
-
-def _merged(sections: Sections, overrides: Sections) -> Sections:
-    """Return `sections`, with the keys of `overrides` in place of theirs."""
-    merged = {name: dict(section) for name, section in sections.items()}
-    for name, section in overrides.items():
-        merged.setdefault(name, {}).update(section)
-    return merged
 
 
 def _run_all(

@@ -50,7 +50,7 @@ class EpisodicCues:
 
     def recalled(self, cue: StoredEpisode, is_wanted: Callable[[int], bool]) -> Found | None:
         """The best match, of the episodes that are wanted, that a cue completes to at its place or
-        one beside it; None where it is none.
+        one beside it; None if it is none.
         """
         found = []
         for vector in cues(cue, self._items):

@@ -226,7 +226,7 @@ class EpisodicMemory:
 
     def _join(self, name: str) -> None:
         """Move what happened in this run into the frame of the map `name`, which was joined to the
-        root map. Where it is not known how that lies, what happened before is forgotten.
+        root map. If it is not known how that lies, what happened before is forgotten.
         """
         recollection = self._recollection
         pose: Floats | None = None

@@ -164,7 +164,7 @@ class ForgottenObjects:
 
     def _enter(self, frame: str) -> None:
         """Follow the root map into the frame of the recalled map of that name, which was joined to
-        it. Where it is not known how that lies, nothing can be kept.
+        it. If it is not known how that lies, nothing can be kept.
         """
         if frame == self._frame:
             return

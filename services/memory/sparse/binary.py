@@ -47,7 +47,7 @@ class BinaryMemory:
         self._counters[is_active] = np.clip(counted, -COUNTER_LIMIT, COUNTER_LIMIT)
 
     def read_once(self, cue: Bytes) -> Bytes | None:
-        """The sign of each bit's sum, and the cue's bit where that is zero; None where no location
+        """The sign of each bit's sum, and the cue's bit where that is zero; None if no location
         within reach holds anything.
         """
         held = self._counters[self._is_active(cue)]
@@ -58,7 +58,7 @@ class BinaryMemory:
         return np.where(sums == 0, cue, sums > 0).astype(np.uint8)
 
     def read(self, cue: Bytes) -> Recall | None:
-        """Read with what was read, until that does not change; None where a read finds nothing."""
+        """Read with what was read, until that does not change; None if a read finds nothing."""
         return iterated_read(self.read_once, cue)
 
     def _is_active(self, cue: Bytes) -> Booleans:

@@ -34,13 +34,13 @@ class CleanUpMemory(Generic[Key]):
         del self._vectors[key]
 
     def get(self, key: Key) -> Bytes:
-        """The vector of a key. Raises KeyError where there is none."""
+        """The vector of a key. Raises KeyError if there is none."""
         return self._vectors[key]
 
     def nearest(
         self, vector: Bytes, is_wanted: Callable[[Key], bool] = lambda _: True
     ) -> Key | None:
-        """The key of the vector nearest to one, of those that are wanted; None where that is
+        """The key of the vector nearest to one, of those that are wanted; None if that is
         related to none.
         """
         keys = [key for key in self._vectors if is_wanted(key)]

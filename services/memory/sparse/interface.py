@@ -45,11 +45,11 @@ class AssociativeMemory(Protocol):
         ...
 
     def read_once(self, cue: Bytes) -> Bytes | None:
-        """What is stored around `cue`; None where nothing is within its reach."""
+        """What is stored around `cue`; None if nothing is within its reach."""
         ...
 
     def read(self, cue: Bytes) -> Recall | None:
-        """Read with what was read, until that does not change; None where a read finds nothing.
+        """Read with what was read, until that does not change; None if a read finds nothing.
 
         Some vector is read for a cue that was never stored, too. It is then seldom converged on in
         a memory that holds much, and not related to the cue (`vectors.contains`).

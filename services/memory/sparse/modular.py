@@ -101,7 +101,7 @@ class ModularMemory:
         self._totals += np.subtract(after, before, dtype=np.int32).sum(axis=0)
 
     def read_once(self, cue: Bytes) -> Bytes | None:
-        """What is stored around `cue`; None where nothing is stored at all."""
+        """What is stored around `cue`; None if nothing is stored at all."""
         sums = self._sums(self._active(cue))
         if not sums.any():
             return None
@@ -109,7 +109,7 @@ class ModularMemory:
         return nearest_phases(sums, cue)
 
     def read(self, cue: Bytes) -> Recall | None:
-        """Read with what was read, until that does not change; None where nothing is stored."""
+        """Read with what was read, until that does not change; None if nothing is stored."""
         return iterated_read(self.read_once, cue)
 
     def _active(self, cue: Bytes) -> _Active:

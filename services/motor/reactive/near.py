@@ -116,7 +116,7 @@ class NearObstacles:
 
     def clear_curvature(self, wanted_per_m: float) -> float | None:
         """The curvature nearest to the one that is wanted whose arc leads past all that is near;
-        None where none does.
+        None if none does.
         """
         # Near enough to matter, and seen in MIN_SCANS scans or suddenly.
         is_near = np.hypot(*self._points_m.T) <= ARC_M + self._clearance_m + SAME_M
@@ -207,7 +207,7 @@ def _ends_m(bearing_rad: Floats, range_m: Floats) -> Floats:
     hit at the farthest.
 
     Rays of (k,) ascending bearings sample a surface: it ends somewhere between two of them, which
-    is far along it at a small angle of incidence. What leaves the view goes on as well.
+    is far along it at a small angle of incidence. What leaves the view continues as well.
     """
     step_rad = float(np.diff(bearing_rad).mean())
     after_m = np.append(range_m[1:], np.inf)

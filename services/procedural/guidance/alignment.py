@@ -84,7 +84,7 @@ def pairs_of(then: Sequence[Relation], now: Sequence[Relation]) -> list[Pair]:
 
 def aligned(pairs: Sequence[Pair]) -> tuple[Motion, list[Pair]] | None:
     """The motion that brings landmarks from where they stood to where they stand, and those that
-    agree with it; None where fewer than two agree of several. One alone moves them without turning.
+    agree with it; None if fewer than two agree of several. One alone moves them without turning.
     """
     left = list(pairs)
     while left:

@@ -14,7 +14,7 @@ HALF_AWAY_M = 4.0
 HALF_TURNED_RAD = 0.5
 UNTRIED = 0.5
 SALIENCE = 0.3
-ENOUGH = 3
+MIN_LANDMARKS = 3
 SEEN_NS = "seen_ns"
 RESULT = "self at the end of the path"
 
@@ -66,11 +66,11 @@ class Fit(NamedTuple):
 def fit(
     scheme: GuidanceScheme, relations: Mapping[str, Relation], activations: Mapping[str, float]
 ) -> Fit | None:
-    """How a scheme fits the `relations` to objects, by their ids; None where it does not.
+    """How a scheme fits the `relations` to objects, by their ids; None if it does not.
 
     Each landmark is as active as its object, the less the farther the agent is from where it
     learned the scheme: half as much at HALF_AWAY_M, or HALF_TURNED_RAD. One that is missing is not
-    active, and fewer than ENOUGH are taken for ENOUGH of which the others are missing.
+    active, and fewer than MIN_LANDMARKS count as that many, the others missing.
     """
     pairs = pairs_of(scheme.landmarks, list(relations.values()))
     found = aligned(pairs)
@@ -87,12 +87,12 @@ def fit(
         landmark = scheme.landmarks[pair.number]
         context[_spelled(landmark)] = closeness * activations.get(names[pair.seen], 0.0)
 
-    activation = sum(context.values()) / max(ENOUGH, len(scheme.landmarks))
+    activation = sum(context.values()) / max(MIN_LANDMARKS, len(scheme.landmarks))
     return Fit(scheme, context, activation, motion)
 
 
 def end_of(parameters: Mapping[str, Scalar]) -> complex | None:
-    """The last place of the path that parameters have; None where they have no path."""
+    """The last place of the path that parameters have; None if they have no path."""
     last = len(parameters) // 2
     ahead_m = parameters.get(f"ahead_{last}_m")
     left_m = parameters.get(f"left_{last}_m")

@@ -19,7 +19,7 @@ STOP_NS = 5_000_000_000
 MAX_LANDMARKS = 6
 MARKED_M = 2.0
 MAX_MARKS = 40
-ENOUGH_LANDMARKS = 2
+MIN_LANDMARKS = 2
 BLIND_SHARE = 0.25
 
 
@@ -136,7 +136,7 @@ class Lessons:
             turn = cmath.rect(1.0, place.heading_rad - self._last.place.heading_rad)
             is_far = since_m >= self._step_m or abs(cmath.phase(turn)) >= TURNED_RAD
             is_blind = since_m >= BLIND_SHARE * self._ahead_m
-        if not is_far or len(nearest) < (1 if is_blind else ENOUGH_LANDMARKS):
+        if not is_far or len(nearest) < (1 if is_blind else MIN_LANDMARKS):
             return
 
         self._last = Begun(nearest, place, self._driven_m, [0j])

@@ -55,7 +55,7 @@ def test_files_packed_with_xz_are_read_as_they_are(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "told"),
+    ("name", "text", "expected"),
     [
         (
             "Robot1_Odometry",
@@ -73,11 +73,11 @@ def test_files_packed_with_xz_are_read_as_they_are(tmp_path: Path) -> None:
     ],
 )
 def test_a_wrong_line_is_named_with_its_number_and_what_was_expected(
-    tmp_path: Path, name: str, text: str, told: str
+    tmp_path: Path, name: str, text: str, expected: str
 ) -> None:
     folder = _folder(tmp_path, **{name: text})
 
-    with pytest.raises(UsageError, match=told.replace(".", r"\.")):
+    with pytest.raises(UsageError, match=expected.replace(".", r"\.")):
         read(folder)
 
 
