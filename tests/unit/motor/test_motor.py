@@ -10,23 +10,15 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.schemas.array import Array
-from cogmap.schemas.sensing import MotorCommand, Pose, RangeScan, SpeedLimit
+from cogmap.schemas.sensing import MotorCommand, Pose, SpeedLimit
 from cogmap.services.motor.aim import Aim
 from cogmap.services.motor.config import Config
 from cogmap.services.motor.motor import SensoryMotorMemory, obstacle_ahead_m
 from cogmap.services.motor.programs import FollowPlan
 from cogmap.services.motor.reactive.near import NearObstacles
 from cogmap.services.motor.route import SMOOTHED_M
+from cogmap.testing import range_scan
 from tests.support.world.plans import Point, plan_along
-
-
-def _scan(*obstacles: tuple[float, float]) -> RangeScan:
-    bearing_rad, range_m = np.array(obstacles, np.float32).reshape(-1, 2).T
-    return RangeScan(
-        frame=1,
-        bearing_rad=Array.of(bearing_rad),
-        range_m=Array.of(range_m),
-    )
 
 
 def _command(
@@ -180,7 +172,7 @@ def test_a_pose_older_than_the_limit_halts_the_robot() -> None:
 
 
 def test_the_second_nearest_point_ahead_is_the_obstacle() -> None:
-    ahead = _scan((0.0, 8.0), (0.05, 8.2))
+    ahead = range_scan((0.0, 8.0), (0.05, 8.2))
 
     assert obstacle_ahead_m(ahead, 0.7) == pytest.approx(8.2, abs=0.05)
 
@@ -198,12 +190,12 @@ def test_the_second_nearest_point_ahead_is_the_obstacle() -> None:
 def test_what_stands_aside_behind_or_alone_is_no_obstacle(
     points: list[tuple[float, float]],
 ) -> None:
-    assert obstacle_ahead_m(_scan(*points), 0.7) == math.inf
+    assert obstacle_ahead_m(range_scan(*points), 0.7) == math.inf
 
 
 def test_a_scan_whose_bearings_and_ranges_do_not_pair_is_refused() -> None:
     three_ranges = Array.of(np.ones(3, np.float32))
-    scan = msgspec.structs.replace(_scan((0.0, 8.0), (0.1, 8.0)), range_m=three_ranges)
+    scan = msgspec.structs.replace(range_scan((0.0, 8.0), (0.1, 8.0)), range_m=three_ranges)
 
     with pytest.raises(MessageError, match="2,\\) bearings and \\(3"):
         obstacle_ahead_m(scan, 0.7)

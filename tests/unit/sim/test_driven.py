@@ -36,7 +36,7 @@ from cogmap.services.sim.layout.plan import Plot, Road
 from cogmap.services.sim.module import Config, build
 from cogmap.services.sim.odometry import Noise
 from cogmap.services.sim.scripted.percepts import PerceptErrors
-from tests.support.messages import of_type
+from cogmap.testing import of_type
 
 MOUNT = calibration()
 TOWN = generate(1)

@@ -13,7 +13,8 @@ from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.sensing import RangeScan
-from tests.support.world.scenes import Desk, motion, percepts, stamp_ns
+from cogmap.testing import percepts, range_scan, self_motion, stamp_ns
+from tests.support.world.scenes import Desk
 
 RAYS = ((0.1, 5.0), (0.0, 0.0))
 SCANNED = Run(lockstep=True, participants={"sim": 1})
@@ -22,13 +23,7 @@ LATE_MS = 30
 
 def _scan(frame: int, rays: Sequence[Sequence[float]] = RAYS, late_ms: float = 0) -> RangeScan:
     """The scan of view `frame`, or one that was taken before it."""
-    bearing_rad, range_m = np.array(rays, np.float32).reshape(-1, 2).T
-    return RangeScan(
-        stamp_ns=stamp_ns(frame) - int(late_ms * 1e6),
-        frame=frame,
-        bearing_rad=Array.of(bearing_rad),
-        range_m=Array.of(range_m),
-    )
+    return range_scan(*rays, frame=frame, stamp_ns=stamp_ns(frame) - int(late_ms * 1e6))
 
 
 def _view(desk: Desk, frame: int) -> None:
@@ -91,7 +86,7 @@ def test_a_scan_that_is_published_again_changes_nothing(stepped: Desk) -> None:
     version = stepped.deltas[-1].version
 
     assert stepped.feed(_scan(0)) == []
-    stepped.feed(motion(0))
+    stepped.feed(self_motion(0))
     stepped.feed(percepts(0))
     assert stepped.deltas[-1].version == version
 

@@ -15,7 +15,8 @@ from cogmap.schemas.nodes import Attention, attention_id
 from cogmap.schemas.sensing import Percept, RangeScan
 from cogmap.services.codelets.attention import danger
 from cogmap.services.codelets.attention.config import Config, Danger
-from tests.support.world.scenes import agent, graph_of, landmark, percept, percepts, run
+from cogmap.testing import agent, graph_of, landmark, percept, percepts
+from tests.support.world.scenes import run
 
 CONFIG = Config(danger=Danger(refractory_cycles=1, same_cycles=5))
 BEARINGS_RAD = np.linspace(-0.6, 0.6, 13)

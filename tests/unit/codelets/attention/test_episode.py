@@ -12,7 +12,8 @@ from cogmap.schemas.graph import Decay, Delta, Phase
 from cogmap.schemas.nodes import Episode, Remembered, episode_id
 from cogmap.services.codelets.attention import episode
 from cogmap.services.codelets.attention.config import Config
-from tests.support.world.scenes import agent, graph_of, percepts, run, task
+from cogmap.testing import agent, graph_of, percepts, task
+from tests.support.world.scenes import run
 
 CONFIG = Config()
 BAKERY = Remembered(kind="object", label="bakery")

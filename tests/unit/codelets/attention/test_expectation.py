@@ -30,7 +30,8 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.services.codelets.attention.config import Config, Expectation
 from cogmap.services.codelets.attention.disappearance import MANY_OBJECTS
-from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
+from cogmap.testing import agent, cells, graph_of, landmark, percept, task
+from tests.support.world.scenes import run
 
 VIEWS = 3
 """So many in which rays pass where a house stood are a surprise; twice as many without."""
@@ -210,9 +211,8 @@ def _at_its_place(house: AnyNode) -> Operation:
     return Link(source=house.id, target=f"place:map:0:{round(HOUSE_M)}:0", kind=LinkKind.AT)
 
 
-def _cells(column: PlaceColumn, cells: list[tuple[int, int]]) -> Cells:
-    values = np.ones(len(cells), np.float32)
-    return Cells(column=column, cells=Array.of(np.array(cells, np.int32)), values=Array.of(values))
+def _cells(column: PlaceColumn, marked: list[tuple[int, int]]) -> Cells:
+    return cells(column, dict.fromkeys(marked, 1.0))
 
 
 ROUTE_M = [(float(i), 0.0) for i in range(60)]

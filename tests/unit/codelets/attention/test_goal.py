@@ -25,7 +25,8 @@ from cogmap.schemas.nodes import (
 from cogmap.services.codelets.attention import goal
 from cogmap.services.codelets.attention.config import Config
 from cogmap.services.codelets.attention.config import Goal as Settings
-from tests.support.world.scenes import agent, graph_of, percepts, run
+from cogmap.testing import agent, graph_of, percepts
+from tests.support.world.scenes import run
 
 CONFIG = Config(goal=Settings(refractory_cycles=1, change_salience=0.5))
 INN = goal_id("inn")

@@ -13,7 +13,8 @@ from cogmap.schemas.graph import Delta, Operation, Phase
 from cogmap.schemas.nodes import Attention, attention_id
 from cogmap.services.codelets.attention import place_lost
 from cogmap.services.codelets.attention.config import Config
-from tests.support.world.scenes import agent, graph_of, landmark, percepts, run, task
+from cogmap.testing import agent, graph_of, landmark, percepts, task
+from tests.support.world.scenes import run
 
 CONFIG = Config()
 MEMORY = attention_id("place_lost")

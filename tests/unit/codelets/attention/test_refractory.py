@@ -14,7 +14,8 @@ from cogmap.schemas.nodes import Attention, Need, attention_id, need_id
 from cogmap.services.codelets.attention import need, novelty, whereabouts
 from cogmap.services.codelets.attention.config import Config, Novelty, Whereabouts
 from cogmap.services.codelets.attention.memory import without_conscious
-from tests.support.world.scenes import agent, graph_of, landmark, percept, percepts, run, task
+from cogmap.testing import agent, graph_of, landmark, percept, percepts, task
+from tests.support.world.scenes import run
 
 PATIENT = Config(novelty=Novelty(refractory_cycles=2))
 NO_MOTION = Array.of(np.zeros((0, 5)))

@@ -17,7 +17,7 @@ from cogmap.services.codelets.localization.measurement_model import (
 )
 from cogmap.services.codelets.localization.novelty import novelty, variances_at
 from cogmap.services.codelets.mapping.path import segments
-from tests.support.world.scenes import graph_of, landmark, percept
+from cogmap.testing import graph_of, landmark, percept
 
 CONFIG = Config()
 RANGE_M = 10.0

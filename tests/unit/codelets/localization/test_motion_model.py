@@ -14,9 +14,10 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.nodes import Object, Self
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.config import Config
-from tests.support.world.scenes import agent as self_node
-from tests.support.world.scenes import graph_of, percept, run, task
-from tests.support.world.scenes import landmark as object_node
+from cogmap.testing import agent as self_node
+from cogmap.testing import graph_of, percept, percept_at, task
+from cogmap.testing import landmark as object_node
+from tests.support.world.scenes import run
 
 PLACES = {"mill": (20.0, 0.0), "tower": (0.0, 25.0), "church": (-15.0, -10.0), "inn": (30.0, 30.0)}
 Pose = tuple[float, float, float]
@@ -56,11 +57,7 @@ def _known(*labels: str, sd_m: float = 0.01) -> list[Object]:
 
 
 def _seen(pose: Pose, label: str, **facts: float) -> Percept:
-    x_m, y_m, heading_rad = pose
-    off_x_m = PLACES[label][0] - x_m
-    off_y_m = PLACES[label][1] - y_m
-    bearing_rad = math.remainder(math.atan2(off_y_m, off_x_m) - heading_rad, math.tau)
-    return percept(label, bearing_rad, math.hypot(off_x_m, off_y_m), **facts)
+    return percept_at(pose, label, PLACES[label], **facts)
 
 
 def _ahead(pose: Pose, distance_m: float = 1.0) -> Pose:

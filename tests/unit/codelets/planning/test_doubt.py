@@ -21,8 +21,8 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.services.codelets.planning.config import Config
 from cogmap.services.codelets.planning.route_plan import run
+from cogmap.testing import agent
 from tests.support.world.route_planning import STAMP_NS, goal_at, planned
-from tests.support.world.scenes import agent
 from tests.support.world.street_loop import barrier, block_of, loop
 
 

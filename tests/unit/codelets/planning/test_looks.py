@@ -11,7 +11,7 @@ from cogmap.geometry.arrays import Floats
 from cogmap.schemas.nodes import PathColumn
 from cogmap.services.codelets.planning.looks import LOOK_M, looked_ago_s
 from cogmap.services.codelets.planning.network import Here
-from tests.support.world.scenes import agent
+from cogmap.testing import agent
 
 NOW_S = 1000.0
 HERE = Here((-10, -10), (60, 21), 1.0)

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
+
 import msgspec
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Cells, Operation
 from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn, coarse_map_id
 from cogmap.services.codelets.sub_maps.coarse_places import Config, run
-from tests.support.world.scenes import agent, graph_of, task
+from cogmap.testing import agent, cells, graph_of, task
 
 CONFIG = Config()
 FINER, COARSEST = coarse_map_id(1), coarse_map_id(2)
@@ -20,10 +21,8 @@ def _cells(
     column: PlaceColumn, i: tuple[int, int], j: tuple[int, int], value: float = 1.0
 ) -> Cells:
     """A value of a rectangle of the root map's cells: from and to i, from and to j."""
-    grid = np.mgrid[i[0] : i[1] + 1, j[0] : j[1] + 1]
-    cells = grid.reshape(2, -1).T
-    values = np.full(len(cells), value, np.float32)
-    return Cells(column=column, cells=Array.of(cells, "<i4"), values=Array.of(values))
+    rectangle = itertools.product(range(i[0], i[1] + 1), range(j[0], j[1] + 1))
+    return cells(column, dict.fromkeys(rectangle, value))
 
 
 def _coarsened(*operations: Operation, updates: int = 1) -> Graph:
