@@ -10,15 +10,16 @@ import msgspec
 from rich.console import Console
 
 from cogmap.bus.session import free_endpoint
+from cogmap.cli.files import LOG_NAME
+from cogmap.cli.launch.display import Display, display_on
 from cogmap.cli.launch.drive import Drive
+from cogmap.cli.launch.drive_metrics import RunMetrics
 from cogmap.cli.launch.forking.client import fork_server
-from cogmap.cli.launch.metrics import RunMetrics
 from cogmap.cli.launch.observer import Errors, Observer
 from cogmap.cli.launch.outcome import Outcome
-from cogmap.cli.launch.plan import LOG_NAME, Choices, effective
+from cogmap.cli.launch.plan import Choices, effective
 from cogmap.cli.launch.watch import Watch
 from cogmap.cli.run import summary
-from cogmap.cli.run.display import Display, display_on
 from cogmap.errors import CogmapError
 from cogmap.recording.recorder import Summary
 from cogmap.recording.storage.format import SUMMARY

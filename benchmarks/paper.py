@@ -5,7 +5,7 @@ from __future__ import annotations
 from benchmarks.benchmark import Setting
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most, more_than, within
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.experiments.city_maps import measure as city_maps
 from cogmap.experiments.city_maps.metrics import map_metrics
 from cogmap.experiments.city_maps.sources import grown_environments

@@ -15,7 +15,7 @@ from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Delivery, Topic
 from cogmap.services import registry
-from cogmap.services.codelets.table import CODELETS
+from cogmap.services.codelets.table import own_codelets
 
 PAGE = Path("docs/architecture.md")
 OBSERVERS = "observers"
@@ -114,7 +114,7 @@ def topic_table(modules: list[Module]) -> str:
 def codelet_table(modules: list[Module]) -> str:
     """The table of codelets: when they run, what they read, and what they may write."""
     lines = ["| codelet | phase | reads | writes |", "|---|---|---|---|"]
-    for codelet in CODELETS:
+    for codelet in own_codelets():
         reads = _kinds(codelet.reads)
         writes = _kinds(codelet.writes)
         lines.append(f"| `{codelet.name}` | {codelet.phase} | {reads} | {writes} |")

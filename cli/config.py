@@ -13,7 +13,7 @@ import tomli_w
 
 from cogmap.cli.launch.plan import Choices, effective
 from cogmap.cli.options import config_option, json_option, set_option
-from cogmap.cli.run.command import codelets_option, laps_option, lockstep_option, seed_option
+from cogmap.cli.run.options import codelets_option, laps_option, lockstep_option, seed_option
 from cogmap.errors import UsageError
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
@@ -157,6 +157,20 @@ def _array_of_tables(path: list[str], tables: list[dict[str, Any]]) -> list[str]
 
 def _comment(schema: Schema) -> list[str]:
     description = schema.get("description", "")
+    bounds = _range(schema)
+    if bounds and bounds not in description:
+        description = f"{description} ({bounds})"
     return textwrap.wrap(
         description, COLUMNS, initial_indent="# ", subsequent_indent="# ", break_long_words=False
     )
+
+
+def _range(schema: Schema) -> str:
+    """The range of a number in words, such as "above 0 to 1"; empty for what has none."""
+    lowest = schema.get("minimum", schema.get("exclusiveMinimum"))
+    highest = schema.get("maximum", schema.get("exclusiveMaximum"))
+    if lowest is None or highest is None:
+        return ""
+
+    words = f"{lowest:g} to {highest:g}".replace("e+0", "e").replace("e+", "e")
+    return words if "minimum" in schema else f"above {words}"

@@ -1,4 +1,4 @@
-"""`cogmap module` and `cogmap router`: what runs until it is stopped."""
+"""`cogmap module` and `cogmap router`: run until they are stopped."""
 
 from __future__ import annotations
 
@@ -10,21 +10,25 @@ from cogmap.cli.options import agent_option, config_option, connect_option, set_
 from cogmap.runtime import config, process
 from cogmap.services import registry
 
-tied_option = click.option("--tied", is_flag=True, help="End when standard input ends.")
+tied_option = click.option("--tied", is_flag=True, help="End when standard input is closed.")
 
 
 @click.command()
 @click.argument("name", metavar="NAME")
-@click.option("--instance", default="", help="Its own name, where several of one module run.")
 @click.option(
-    "--state", type=click.Path(path_type=Path), help="A folder for what it must not lose."
+    "--instance", default="", help="A name of its own, if several processes run this module."
+)
+@click.option(
+    "--state",
+    type=click.Path(path_type=Path),
+    help="A folder in which it keeps its state over restarts.",
 )
 @click.option(
     "--memory",
     type=click.Path(dir_okay=False, path_type=Path),
-    help="The database of what long-term memory keeps between runs.",
+    help="The database of long-term memory.",
 )
-@click.option("--held", is_flag=True, help="Join the others only after a line on standard input.")
+@click.option("--held", is_flag=True, help="Connect only after a line on standard input.")
 @tied_option
 @connect_option
 @agent_option
@@ -42,12 +46,15 @@ def module(
     config_path: Path | None,
     settings: tuple[str, ...],
 ) -> None:
-    """Run one module as this process."""
+    """Run the module NAME as this process.
+
+    `cogmap config` prints a section for each module that there is.
+    """
     sections = config.load(config_path, settings)
     built = registry.build(name, sections, instance)
     if held and not process.await_line():
         return
-    process.run_module(built, connect, agent, state, process.Stop(tied), memory=memory)
+    process.run_module(built, connect, agent, state, tied=tied, memory=memory)
 
 
 @click.command()

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from cogmap.cli.launch.plan import LOG_NAME
+from cogmap.cli.files import log_file
 from cogmap.errors import LogError
 from cogmap.recording.log import open_log
 from cogmap.runtime.state.new_file import new_file
@@ -16,8 +16,8 @@ from cogmap.services.procedural.guidance.toml import written
 
 _EPILOG = """\b
 Examples:
-  cogmap schemes runs/latest                     as they are written in a file of schemes
-  cogmap schemes runs/latest --out route.toml    into a new file
+  cogmap schemes runs/latest                     print them, as TOML
+  cogmap schemes runs/latest --out route.toml    write a new file
   cogmap run --town blocks --set planning.explore=false --set procedural.schemes=route.toml
 """
 
@@ -33,11 +33,11 @@ Examples:
 def schemes(log: Path, out: Path | None) -> None:
     """Write the guidance schemes learned on the drive in LOG, which may be a run's folder.
 
-    Each has what stood where as seen by the agent, and the path that it drove from there. An agent
-    that is given them in a file of schemes, and no goal, drives where the other one drove, from
-    where that one began.
+    A scheme holds the objects around the agent at a place, and the path that it drove from there.
+    An agent that starts at the same place with these schemes, and without goals, drives the same
+    way.
     """
-    path = log / LOG_NAME if log.is_dir() else log
+    path = log_file(log)
     found = learned(path)
     if not found:
         raise LogError(f"{path} holds no guidance schemes: record a drive to a goal past buildings")

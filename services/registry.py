@@ -59,7 +59,6 @@ _OF_CODELETS = (
     "scipy.sparse.csgraph",
     "scipy.spatial",
     "scipy.optimize",
-    "cogmap.services.codelets.table",
 )
 
 
@@ -81,11 +80,11 @@ def _settings_found_on(path: tuple[str, ...]) -> dict[str, type[msgspec.Struct]]
     from cogmap.runtime.codelet import ENTRY_POINTS
 
     if entry_points(group=ENTRY_POINTS):
-        return {codelet.section: codelet.config for codelet in codelets()}
+        return {codelet.section: codelet.config for codelet in codelets() if codelet.section}
 
-    from cogmap.services.codelets.sections import SECTIONS
+    from cogmap.services.codelets.table import own_settings
 
-    return SECTIONS
+    return own_settings()
 
 
 def config_type(name: str) -> type[msgspec.Struct]:
@@ -130,6 +129,11 @@ def prepare(name: str) -> Iterator[None]:
         for part in _OF_CODELETS:
             import_module(part)
             yield
+
+        from cogmap.services.codelets.table import own_codelets
+
+        own_codelets()
+        yield
 
     resolve_name(ENTRIES[name].build)
     yield

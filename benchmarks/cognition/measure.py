@@ -16,7 +16,7 @@ from benchmarks.cognition.random_actions import RandomActions
 from benchmarks.drive import drive
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most, within
-from cogmap.cli.launch.plan import LOG_NAME
+from cogmap.cli.files import LOG_NAME
 from cogmap.parallel import parallel_map
 
 TOWNS = 10

@@ -16,7 +16,7 @@ from benchmarks.explore.trials import Trial
 from benchmarks.harness import agent_modules, build, running, town_sections
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.parallel import parallel_map
 
 TOWNS = 10

@@ -15,7 +15,7 @@ from benchmarks.lifelong.courier import Courier
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from cogmap.cli.launch.observer import Observer
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.errors import CogmapError
 from cogmap.graph.graph import Graph
 from cogmap.parallel import Progress

@@ -28,11 +28,13 @@ class Drive(NamedTuple):
     """What was believed of a drive: (n, 3) poses `online` and by path integration at each moment.
 
     `path` (m, 7) is the path on the map in the end: stamp_s, pose, pose by path integration.
+    `late_answers` is how many answers of background codelets came too late to be committed.
     """
 
     online: Floats
     odometry: Floats
     path: Floats
+    late_answers: int
 
     def corrected(self, stamps_s: Floats) -> Floats:
         """(n, 3) poses at the moments as the map has them in the end.
@@ -74,7 +76,7 @@ def follow(
 
     path = loop.path
     loop.close()
-    return Drive(np.array(poses), np.array(odometry), path)
+    return Drive(np.array(poses), np.array(odometry), path, loop.late_answers)
 
 
 def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics:
@@ -111,6 +113,7 @@ def _mapping_errors(log: Sequence[Moment], truth: Truth) -> Metrics:
         "slam_online_rmse_m": float(np.mean(online_m)),
         "path_integration_rmse_m": truth.aligned_error_m(drives[0].odometry),
         "smoother_rmse_m": truth.aligned_error_m(smoothed),
+        "late_answers": float(sum(drive.late_answers for drive in drives)),
     }
 
 

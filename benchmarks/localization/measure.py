@@ -15,7 +15,7 @@ from benchmarks.localization.drives import evaluate
 from benchmarks.localization.recovery import evaluate_recovery
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.data.mrclam import read
 from cogmap.parallel import parallel_map
 

@@ -18,6 +18,7 @@ from cogmap.schemas.nodes import (
     AnyNode,
     Map,
     Object,
+    PathIntegration,
     PathSegment,
     Self,
     object_id,
@@ -70,9 +71,7 @@ def _self_node(start: Pose, samples: int) -> Self:
         x_m=x_m,
         y_m=y_m,
         heading_rad=heading_rad,
-        odometry_x_m=x_m,
-        odometry_y_m=y_m,
-        odometry_heading_rad=heading_rad,
+        odometry=PathIntegration(x_m=x_m, y_m=y_m, heading_rad=heading_rad),
         samples=Matrix.of(certain),
     )
 
@@ -85,14 +84,7 @@ def pose(graph: Graph) -> Floats:
 
 def odometry(graph: Graph) -> Floats:
     """(3,): where path integration alone would have the agent."""
-    agent = _agent(graph)
-    return np.array(
-        [
-            agent.odometry_x_m,
-            agent.odometry_y_m,
-            agent.odometry_heading_rad,
-        ]
-    )
+    return _agent(graph).odometry.pose()
 
 
 def path(graph: Graph) -> Floats:

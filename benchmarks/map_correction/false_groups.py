@@ -16,7 +16,7 @@ from benchmarks.map_correction.files import read_truth
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
 from benchmarks.trajectory import trajectory_error_m
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.errors import UsageError
 from cogmap.estimation.gnc import inliers
 from cogmap.estimation.least_squares import optimize
@@ -24,7 +24,7 @@ from cogmap.estimation.pose_graph import Constraints, PoseGraph
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import compose, integrate, relative
 from cogmap.parallel import parallel_map
-from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.correction.deferral import FALSE_CLOSURE
 
 THRESHOLDS = {
     "ate_ratio": at_most(1.1),
@@ -88,7 +88,7 @@ def _kept(groups: Groups, graph: PoseGraph) -> tuple[Booleans, Floats]:
     in_order = graph.with_closures(closures.select(order))
 
     is_kept = np.zeros(len(closures), bool)
-    is_kept[order] = inliers(in_order, Config().false_closure)
+    is_kept[order] = inliers(in_order, FALSE_CLOSURE)
     poses = optimize(graph.with_closures(closures.select(is_kept)))
     return is_kept, poses
 

@@ -12,7 +12,7 @@ from random import Random
 from typing import NamedTuple
 
 from benchmarks.memory.writer import record_of
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.errors import StorageError
 from cogmap.runtime.state.database import Database, write_new
 from cogmap.runtime.state.record import Record, digest_of

@@ -15,6 +15,7 @@ from cogmap.schemas.memory import TransientEpisode
 from cogmap.schemas.nodes import Remembered
 from cogmap.services.memory.episodic.config import EpisodicConfig
 from cogmap.services.memory.episodic.cues import MAX_LEARNED, EpisodicCues
+from cogmap.services.memory.episodic.episodic_memory import MIN_MATCH
 from cogmap.services.memory.sparse.config import SparseConfig
 
 CUES = 200
@@ -33,7 +34,7 @@ def measure(seed: int) -> Metrics:
     config = EpisodicConfig()
     rng = np.random.default_rng(seed)
     episodes = _episodes(config.max_declarative, rng)
-    cues = EpisodicCues(SparseConfig(seed=seed), config.place_m)
+    cues = EpisodicCues(SparseConfig(seed=seed))
     for _ in range(0, len(episodes), MAX_LEARNED):
         cues.hold(episodes)
 
@@ -42,7 +43,7 @@ def measure(seed: int) -> Metrics:
     for number in rng.choice(sorted(episodes), CUES, replace=False).tolist():
         cue = _cue(episodes[number], rng)
         found = cues.recalled(cue, lambda _: True)
-        if found is not None and found.match >= config.min_match:
+        if found is not None and found.match >= MIN_MATCH:
             right += found.number == number
             wrong += found.number != number
 

@@ -19,7 +19,6 @@ from cogmap.geometry.se2 import relative, transform_to
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.memory import StoredObjects
 from cogmap.schemas.nodes import TILE_SIDE, Object, individual_label, object_id
-from cogmap.services.memory.config import Config
 from cogmap.services.memory.maps import RememberedMap
 from cogmap.services.memory.passing import Way
 from cogmap.services.memory.recall import cues, recalled
@@ -41,7 +40,6 @@ WAY_M = 130
 SIGHTINGS = 9
 RIGHT_WITHIN_M = 4.0
 RIGHT_WITHIN_RAD = 0.1
-DEFAULTS = Config()
 
 
 class Walk(NamedTuple):
@@ -69,7 +67,7 @@ class Walk(NamedTuple):
         return nodes
 
 
-def measure(seed: int, config: Config = DEFAULTS, towns: int = TOWNS) -> Metrics:
+def measure(seed: int, towns: int = TOWNS) -> Metrics:
     """The way driven before a town's own map is recalled and right, the whole way where it is not;
     the share of the towns where it is; and how many maps are recalled wrongly, of the town's own or
     of the others'.
@@ -81,12 +79,12 @@ def measure(seed: int, config: Config = DEFAULTS, towns: int = TOWNS) -> Metrics
     are_right = []
     wrong = 0
     for number, (first, second) in enumerate(walks):
-        way_m, own = recalled_after(second, [maps[number]], config)
+        way_m, own = recalled_after(second, [maps[number]])
         is_own_right = own is not None and is_right(own, first, second)
         ways_m.append(way_m if is_own_right else len(second.way_m))
         are_right.append(is_own_right)
 
-        _, strange = recalled_after(second, maps[:number] + maps[number + 1 :], config)
+        _, strange = recalled_after(second, maps[:number] + maps[number + 1 :])
         wrong += strange is not None
         wrong += own is not None and not is_own_right
 
@@ -97,9 +95,7 @@ def measure(seed: int, config: Config = DEFAULTS, towns: int = TOWNS) -> Metrics
     }
 
 
-def recalled_after(
-    walk: Walk, stored: Sequence[RememberedMap], config: Config
-) -> tuple[int, Floats | None]:
+def recalled_after(walk: Walk, stored: Sequence[RememberedMap]) -> tuple[int, Floats | None]:
     """After which way, in m, one of some maps is recalled, and the pose of the walk's frame in its
     own; None where none is.
     """
@@ -107,7 +103,7 @@ def recalled_after(
         known = walk.objects(driven_m)
         x_m, y_m = walk.way_m[driven_m].tolist()
         way = Way(walk.way_m[max(0, driven_m - WAY_M) : driven_m], known)
-        found = recalled(cues(known, (x_m, y_m)), way, stored, 1.0, config)
+        found = recalled(cues(known, (x_m, y_m)), way, stored, 1.0)
         if found is not None:
             return driven_m, found.pose
 

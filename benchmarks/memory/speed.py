@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.timing import least_cpu_s
 from cogmap.geometry.arrays import Bytes
 from cogmap.services.memory.sparse.config import SparseConfig
-from cogmap.services.memory.sparse.memory import SparseMemory, hard_addresses
+from cogmap.services.memory.sparse.modular import ModularMemory, hard_addresses
 from cogmap.services.memory.sparse.vectors import VALUES, nearest_phases, random_vectors
 
 MASK = np.uint8(VALUES - 1)
@@ -19,14 +19,14 @@ MEMORY_READS = 100
 class NumpyLoop:
     """The read of a memory one hard location after the other, on vectors a byte a dimension."""
 
-    def __init__(self, config: SparseConfig, memory: SparseMemory) -> None:
+    def __init__(self, config: SparseConfig, memory: ModularMemory) -> None:
         self._addresses = hard_addresses(config)
         self._counters = memory.counters
         self._mean = memory.counters.mean(axis=0)
         self._radius = memory.radius
 
     def read_once(self, cue: Bytes) -> Bytes:
-        """What `SparseMemory.read_once` reads."""
+        """What `ModularMemory.read_once` reads."""
         sums = np.zeros_like(self._mean)
         weights = 0
 
@@ -48,7 +48,7 @@ def reads_vs_numpy_loop(seed: int) -> float:
     Both are the least CPU time of several reads.
     """
     config = SparseConfig(seed=seed)
-    memory = SparseMemory(config)
+    memory = ModularMemory(config)
     rng = np.random.default_rng([seed, 0])
     for vector in random_vectors(rng, WRITTEN, config.dimensions):
         memory.write(vector, vector)

@@ -17,7 +17,7 @@ from benchmarks.perception.road import road_edge_error_m
 from benchmarks.perception.scenes import FARTHEST_M, FIRST_SEED, NEAREST_M
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.parallel import parallel_map
 
 THRESHOLDS = {

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.data.moving_ai import Problem, read_map, read_problems
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.services.codelets.planning.network import Cell, PlaceNetwork, grid_network

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.data import tsplib
 from cogmap.data.human_tours import read_folder
 from cogmap.data.tsplib import Problem

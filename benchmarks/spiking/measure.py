@@ -11,8 +11,8 @@ import numpy as np
 from benchmarks.benchmark import PROCESSES, Setting
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most, within
-from cogmap.cli.experiment.outcome import save_figure
-from cogmap.cli.log.progress import bar
+from cogmap.cli.experiment.results import save_figure
+from cogmap.cli.progress import bar
 from cogmap.experiments.spiking.cells import Values
 from cogmap.experiments.spiking.network import Border, Cues, Posterior, Recording, exact, record
 from cogmap.parallel import parallel_map

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from cogmap.cli.experiment import live, outcome
+from cogmap.cli.experiment import live, results
 from cogmap.cli.experiment.options import Common, common_options
-from cogmap.cli.log.progress import bar
 from cogmap.cli.options import FiniteRange
+from cogmap.cli.progress import bar
 from cogmap.errors import UsageError
 from cogmap.experiments.city_maps.drive import MODULES
 from cogmap.experiments.city_maps.environment import Environment, environments
@@ -97,7 +97,7 @@ def city_maps(
     anew so often by an agent that knows nothing, from any of the buildings. Percepts are not drawn:
     they err as perception was measured to.
     """
-    out = outcome.folder_for(NAME, common.out)
+    out = results.folder_for(NAME, common.out)
     places = _places(osm, all_in, maps, common.seed)
     chosen = Noise(speed=noise[0], turn=noise[1], drift_rad_per_sqrt_m=noise[2])
 
@@ -121,7 +121,7 @@ def city_maps(
         differing = live.differing(configurations(first)["heading"], MODULES)
         metrics[live.SAME] = float(not differing)
 
-    outcome.show(NAME, metrics)
+    results.show(NAME, metrics)
     _save(out, found, metrics, common)
     live.check(differing)
 
@@ -129,7 +129,7 @@ def city_maps(
 def _save(out: Path, found: list[CityMap], metrics: dict[str, float | str], common: Common) -> None:
     from cogmap.cli.plots.cities import figure  # matplotlib takes long to import
 
-    outcome.save(out, NAME, figure(found, metrics), metrics, common)
+    results.save(out, NAME, figure(found, metrics), metrics, common)
 
 
 def _places(

@@ -4,12 +4,30 @@ from __future__ import annotations
 
 import click
 
-from cogmap.cli.experiment.city_maps import city_maps
-from cogmap.cli.experiment.cue_integration import cue_integration
-from cogmap.cli.experiment.loop_closing import loop_closing
-from cogmap.cli.experiment.map_structure import map_structure
-from cogmap.cli.experiment.route_planning import route_planning
+from cogmap.cli.verbs import add_verbs
 
+VERBS = {
+    "city-maps": (
+        "cogmap.cli.experiment.city_maps:city_maps",
+        "Experiment 2, figure 8: maps learned of cities.",
+    ),
+    "cue-integration": (
+        "cogmap.cli.experiment.cue_integration:cue_integration",
+        "Experiment 1, figure 7: self-motion and landmarks.",
+    ),
+    "loop-closing": (
+        "cogmap.cli.experiment.loop_closing:loop_closing",
+        "Figure 6: a path before and after its loop is closed.",
+    ),
+    "map-structure": (
+        "cogmap.cli.experiment.map_structure:map_structure",
+        "Sub-maps of real cities.",
+    ),
+    "route-planning": (
+        "cogmap.cli.experiment.route_planning:route_planning",
+        "Experiment 3, figure 5: the order of several goals.",
+    ),
+}
 _EPILOG = """\b
 Each leaves a folder with its figure as PNG and PDF, and a JSON file of every metric printed,
 the seed and the command.
@@ -18,11 +36,7 @@ the seed and the command.
 
 @click.group(epilog=_EPILOG)
 def experiment() -> None:
-    """Run the paper's experiments, through the same modules that drive the town."""
+    """Run the paper's experiments, with the same modules that drive the robot in the town."""
 
 
-experiment.add_command(city_maps)
-experiment.add_command(cue_integration)
-experiment.add_command(loop_closing)
-experiment.add_command(map_structure)
-experiment.add_command(route_planning)
+add_verbs(experiment, VERBS)

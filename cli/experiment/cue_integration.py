@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import click
 
-from cogmap.cli.experiment import live, outcome
+from cogmap.cli.experiment import live, results
 from cogmap.cli.experiment.options import Common, common_options
-from cogmap.cli.log.progress import bar
 from cogmap.cli.options import FiniteRange
+from cogmap.cli.progress import bar
 from cogmap.experiments.cue_integration import agent, camera_level
 from cogmap.experiments.cue_integration.run import (
     FIT_TRIALS,
@@ -55,7 +55,7 @@ def cue_integration(common: Common, trials: int, distance_noise: float, fit: boo
     disorientation, both, and both in conflict, landmarks turned by 15°. The published results
     beside ours are a simulation's, not people's.
     """
-    folder = outcome.folder_for(NAME, common.out)
+    folder = results.folder_for(NAME, common.out)
     noise = Noise(FITTED.speed, FITTED.turn, distance_noise)
 
     if fit:
@@ -76,11 +76,11 @@ def cue_integration(common: Common, trials: int, distance_noise: float, fit: boo
         differing = _differing(Trial(Condition.CONFLICT, 0, noise, common.seed))
         metrics[live.SAME] = float(not differing)
 
-    outcome.show(NAME, metrics)
+    results.show(NAME, metrics)
 
     from cogmap.cli.plots.cue_integration import figure  # matplotlib takes long to import
 
-    outcome.save(folder, NAME, figure(found), metrics, common)
+    results.save(folder, NAME, figure(found), metrics, common)
     live.check(differing)
 
 

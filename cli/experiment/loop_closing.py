@@ -7,9 +7,9 @@ from typing import Any
 
 import click
 
-from cogmap.cli.experiment import live, outcome
+from cogmap.cli.experiment import live, results
 from cogmap.cli.experiment.options import Common, common_options
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.experiments.loop_closing.metrics import loop_metrics, rule_metrics
 from cogmap.experiments.loop_closing.observer import Loop
 from cogmap.experiments.loop_closing.run import METHODS, MODULES, drive, drive_by_cameras, sections
@@ -32,7 +32,7 @@ def loop_closing(common: Common) -> None:
     Percepts are not drawn: they err as perception was measured to; --cameras drives once more and
     draws them. Takes about a minute, or two.
     """
-    folder = outcome.folder_for(NAME, common.out)
+    folder = results.folder_for(NAME, common.out)
     loops = _drive(common)
     metrics: dict[str, Any] = loop_metrics(loops) | rule_metrics(common.seed)
 
@@ -46,11 +46,11 @@ def loop_closing(common: Common) -> None:
         differing = live.differing(sections(common.seed, "heading"), MODULES)
         metrics[live.SAME] = float(not differing)
 
-    outcome.show(NAME, metrics)
+    results.show(NAME, metrics)
 
     from cogmap.cli.plots.loop_closing import figure  # matplotlib takes long to import
 
-    outcome.save(folder, NAME, figure(loops, metrics), metrics, common)
+    results.save(folder, NAME, figure(loops, metrics), metrics, common)
     live.check(differing)
 
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from cogmap.cli.experiment import outcome
+from cogmap.cli.experiment import results
 from cogmap.cli.experiment.options import Common, common_options_without_sensing
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.data.osm import SUFFIXES
 from cogmap.errors import UsageError
 from cogmap.experiments.map_structure.city import StructuredCity, read_city
@@ -45,18 +45,18 @@ def map_structure(common: Common, osm: Path | None, all_in: Path | None) -> None
     how large, how often a boundary is between neighbours, and how many stay the same where
     positions err by 2 m. Where an extract names quarters, the agreement with the nearest of those.
     """
-    folder = outcome.folder_for(NAME, common.out)
+    folder = results.folder_for(NAME, common.out)
     cities = _cities(osm, all_in)
 
     with bar("structuring") as progress:
         found = measure(cities, common.seed, common.processes, progress)
 
     metrics = metrics_of(found)
-    outcome.show(NAME, metrics)
+    results.show(NAME, metrics)
 
     from cogmap.cli.plots.sub_maps import figure  # matplotlib takes long to import
 
-    outcome.save(folder, NAME, figure(found), metrics, common)
+    results.save(folder, NAME, figure(found), metrics, common)
 
 
 def _cities(osm: Path | None, all_in: Path | None) -> list[StructuredCity]:

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from cogmap.cli.experiment import outcome
+from cogmap.cli.experiment import results
 from cogmap.cli.experiment.options import Common, common_options_without_sensing
-from cogmap.cli.log.progress import bar
+from cogmap.cli.progress import bar
 from cogmap.data.human_tours import read_folder
 from cogmap.experiments.route_planning import published
 from cogmap.experiments.route_planning.measure import (
@@ -71,7 +71,7 @@ def route_planning(
     computed exactly. The model's participants judge lengths with an error of 3 %, begin at
     different goals and have different grids. Takes some minutes.
     """
-    folder = outcome.folder_for(NAME, common.out)
+    folder = results.folder_for(NAME, common.out)
     from_people = human_jobs(read_folder(data), participants, common.seed) if data else []
     sizes = [size for size in SIZES if size <= max_goals]
     from_seed = drawn_jobs(sizes, drawn, common.seed)
@@ -88,8 +88,8 @@ def route_planning(
         "participants_of_drawn_problems": float(DRAWN_PARTICIPANTS),
         "published_of_4_to_9_goals": published.READ_OFF_BY_EYE,
     }
-    outcome.show(NAME, metrics)
+    results.show(NAME, metrics)
 
     from cogmap.cli.plots.route_planning import figure  # matplotlib takes long to import
 
-    outcome.save(folder, NAME, figure(human, drawn_at_random, metrics), metrics, common)
+    results.save(folder, NAME, figure(human, drawn_at_random, metrics), metrics, common)

@@ -8,14 +8,12 @@ import click
 
 from cogmap.cli.explain import choice
 from cogmap.cli.explain.facts import facts
-from cogmap.cli.explain.moment import Moment, moment
+from cogmap.cli.explain.moment import moment
 from cogmap.cli.explain.screen import print_moment
-from cogmap.cli.launch.plan import LOG_NAME
-from cogmap.cli.log import formatting
-from cogmap.cli.log.files import save
+from cogmap.cli.files import check_picture, log_file, save
 from cogmap.cli.options import FiniteRange, json_option
-from cogmap.errors import UsageError
-from cogmap.recording.log import Log, open_log
+from cogmap.cli.printing import print_json
+from cogmap.recording.log import open_log
 
 PICTURES = (".png", ".svg")
 _EPILOG = """\b
@@ -58,44 +56,26 @@ def explain(
     if at_s is not None and number is not None:
         raise click.UsageError("--at and --cycle both name a moment: leave one out")
     if picture is not None:
-        _check(picture)
+        check_picture("--picture", picture, PICTURES)
 
-    found = _moment(open_log(_file(log)), at_s, number)
+    opened = open_log(log_file(log))
+    choice.require_decisions(opened)
+    if at_s is not None:
+        cycle = choice.at_time(opened, at_s)
+    elif number is not None:
+        cycle = choice.numbered(opened, number)
+    else:
+        cycle = choice.last_broadcast(opened)
+    found = moment(opened, cycle.number, cycle.stamp_ns)
+
     if picture is not None:
-        save(picture, _drawn(found, picture.suffix.lower()))
+        from cogmap.cli.explain.drawing.figure import figure  # matplotlib takes long to import
+
+        save(picture, figure(found, picture.suffix.lower()))
     if as_json:
-        formatting.print_json(facts(found))
+        print_json(facts(found))
         return
+
     print_moment(found)
     if picture is not None:
         click.echo(f"\n{picture}: cycle {found.cycle} as a picture")
-
-
-def _file(log: Path) -> Path:
-    """The log, or the one in a run's folder."""
-    return log / LOG_NAME if log.is_dir() else log
-
-
-def _moment(log: Log, at_s: float | None, number: int | None) -> Moment:
-    choice.require_decisions(log)
-    if at_s is not None:
-        cycle = choice.at_time(log, at_s)
-    elif number is not None:
-        cycle = choice.numbered(log, number)
-    else:
-        cycle = choice.last_broadcast(log)
-    return moment(log, cycle.number, cycle.stamp_ns)
-
-
-def _check(picture: Path) -> None:
-    """Raise UsageError where `picture` cannot be a picture."""
-    if picture.suffix.lower() not in PICTURES:
-        raise UsageError(f"--picture {picture}: name a file that ends in {' or '.join(PICTURES)}")
-    if not picture.parent.is_dir():
-        raise UsageError(f"--picture {picture}: there is no folder {picture.parent}: make it first")
-
-
-def _drawn(found: Moment, suffix: str) -> bytes:
-    from cogmap.cli.plots.moment import figure as plot  # who reads text has no use for matplotlib
-
-    return plot.figure(found, suffix)

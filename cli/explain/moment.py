@@ -80,5 +80,5 @@ def moment(log: Log, cycle: int, stamp_ns: int) -> Moment:
         action=action,
         earlier_action=reading.before_cycle(Action),
         command=reading.command(action),
-        settings=config.typed(log.config, "global_workspace", Config),
+        settings=config.recorded(log.config, "global_workspace", Config),
     )

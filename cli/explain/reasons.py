@@ -15,7 +15,7 @@ from cogmap.schemas.cognition import (
     Rejection,
     Trigger,
 )
-from cogmap.services.global_workspace.config import Config
+from cogmap.services.global_workspace.config import TICK_MS
 
 OUT_OF_IT = frozenset({Fate.DISPLACED, Fate.DECAYED})
 
@@ -115,7 +115,9 @@ def _why_now(moment: Moment, competition: Competition) -> str:
         case Trigger.AGGREGATE:
             figures = f", {sum(activations):.2f} over {settings.aggregate_above:.2f}"
         case Trigger.NO_BROADCAST if silent_s is not None:
-            figures = f", {silent_s:.2f} s where {_no_broadcast_s(settings):.2f} s suffice"
+            figures = (
+                f", {silent_s:.2f} s where {_seconds(settings.no_broadcast_ticks):.2f} s suffice"
+            )
     return f"The broadcast was triggered by: {competition.trigger.value}{figures}."
 
 
@@ -130,7 +132,7 @@ def _why_none(moment: Moment, competition: Competition) -> str:
 
     settings = moment.settings
     silent_s = _silent_s(moment)
-    refractory_s = _seconds(settings, settings.refractory_ticks)
+    refractory_s = _seconds(settings.refractory_ticks)
     if silent_s is not None and silent_s < refractory_s:
         return (
             f"It triggered no broadcast, being refractory: the last was {silent_s:.2f} s before, "
@@ -144,7 +146,7 @@ def _why_none(moment: Moment, competition: Competition) -> str:
         f"{settings.aggregate_above:.2f}",
     ]
     if silent_s is not None:
-        limit_s = _no_broadcast_s(settings)
+        limit_s = _seconds(settings.no_broadcast_ticks)
         needs.append(f"the last broadcast was {silent_s:.2f} s before, short of {limit_s:.2f} s")
     return f"It triggered no broadcast: {'; '.join(needs)}."
 
@@ -191,9 +193,5 @@ def _silent_s(moment: Moment) -> float | None:
     return (moment.stamp_ns - moment.earlier_broadcast.message.stamp_ns) / 1e9
 
 
-def _no_broadcast_s(settings: Config) -> float:
-    return _seconds(settings, settings.no_broadcast_ticks)
-
-
-def _seconds(settings: Config, ticks: int) -> float:
-    return ticks * settings.tick_ms / 1e3
+def _seconds(ticks: int) -> float:
+    return ticks * TICK_MS / 1e3

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.launch.display import Display
 from cogmap.cli.launch.forking.client import ForkServer
 from cogmap.cli.launch.guide import Guide, Stage
 from cogmap.cli.launch.observer import Observer
@@ -26,7 +27,6 @@ from cogmap.cli.launch.plan import (
 from cogmap.cli.launch.supervisor import Supervisor
 from cogmap.cli.launch.watch import Watch
 from cogmap.cli.launch.watchdog import REMEDY, Situation, Watchdog
-from cogmap.cli.run.display import Display
 from cogmap.errors import ProcessFailedError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
@@ -165,7 +165,7 @@ class Drive:
         """How the drive must end now; None while it continues."""
         observer = watch.tally.observer
         if stop.asked:
-            return Ending(Outcome.INTERRUPTED, "it was interrupted")
+            return Ending(Outcome.INTERRUPTED, "interrupted by Ctrl-C")
         if self.guide is not None and self.guide.stage is Stage.COMPLETE:
             return Ending(Outcome.ROUTE_COMPLETE, self.guide.sentence)
         if observer.has_ended:

@@ -10,6 +10,7 @@ from typing import Any
 import msgspec
 import tomli_w
 
+from cogmap.cli.files import LOG_NAME
 from cogmap.cli.launch.command_line import cogmap_command
 from cogmap.cli.launch.supervisor import Program
 from cogmap.errors import ConfigError
@@ -26,7 +27,6 @@ OBSERVER = "observer"
 RECORDER = "recorder"
 ROUTER = "router"
 START_FIRST = (ROUTER, "sim", RECORDER)
-LOG_NAME = "log.mcap"
 CONFIG_NAME = "config.toml"
 STATE_NAME = "state"
 MEMORY_NAME = "memory.db"

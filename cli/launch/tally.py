@@ -1,17 +1,21 @@
-"""Counts what a run's messages amount to: its path, the graph, cycle times, the health of its
-processes. Pure.
+"""Counts the messages of a run: its path, its graph, cycle times, the health of its processes.
+Pure.
 """
 
 from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Mapping
+from statistics import fmean
 
 import msgspec
 
 from cogmap.bus.codec import Envelope
+from cogmap.bus.interface import Arrival
 from cogmap.cli.launch.observer import OBSERVED, Observer
+from cogmap.errors import MessageError
 from cogmap.graph.replica import Replica
+from cogmap.runtime.delivery.intake import Intake
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Broadcast
@@ -43,9 +47,7 @@ class EnergyMetrics(msgspec.Struct, kw_only=True):
 
 
 class EnergyTally:
-    """What the body sensed of its energy, where it sensed any; `charged` is how often the robot was
-    charged.
-    """
+    """Follows the energy that the body senses, if any; `charged` is how often it was charged."""
 
     def __init__(self) -> None:
         self.newest: Energy | None = None
@@ -74,7 +76,7 @@ class EnergyTally:
         return self.lowest <= 0.0
 
     def metrics(self) -> EnergyMetrics | None:
-        """What it amounts to; None where nothing was sensed."""
+        """Return the metrics of the energy; None if none was sensed."""
         if self.newest is None:
             return None
 
@@ -87,8 +89,7 @@ class EnergyTally:
 
 
 class Tally:
-    """What the messages on FOLLOWED show of a run, live or from its log; `replica` follows its
-    graph.
+    """Follows the messages on FOLLOWED of a run, live or from its log; `replica` has its graph.
 
     `cycle_ms`: of each command, the time from the stamping of its camera frame until it was
     received; `bus_ms`: the part of it spent in anything but computing. `refused`: why the last few
@@ -114,6 +115,16 @@ class Tally:
         self.health: dict[str, Health] = {}
         self._busy: dict[str, list[float]] = {}
 
+    def receive(self, arrival: Arrival, intake: Intake) -> None:
+        """Take account of an arrival; `intake` counts it if it is lost, or not valid."""
+        message = intake.accept(arrival)
+        if message is None or arrival.envelope is None:
+            return
+        try:
+            self.update(message, arrival.envelope, arrival.received_ns)
+        except MessageError as error:
+            intake.reject(arrival.topic.name, str(error))
+
     def update(self, message: Message, envelope: Envelope, received_ns: int) -> None:
         """Take account of one message. Raises MessageError where it is not what its topic
         carries.
@@ -121,35 +132,23 @@ class Tally:
         self.observer.update(message)
         match message:
             case Delta():
-                self._on_delta(message)
+                self.dropped += message.rejected
+                self.refused.extend(message.reasons)
+                for operation in message.operations:
+                    if isinstance(operation, DropNode):
+                        node = self.replica.graph.get(Object, operation.id)  # it is there still
+                        if node is not None:
+                            self.forgotten.append(node.label)
+                self.replica.follow(message)
             case Health():
-                self._on_health(message)
+                self.health[message.instance] = message
+                self._busy.setdefault(message.instance, []).append(message.busy)
             case Broadcast():
                 self.broadcasts += 1
             case Energy():
                 self.energy.update(message)
             case MotorCommand():
                 self._on_command(message, envelope, received_ns)
-
-    def _on_delta(self, delta: Delta) -> None:
-        self.dropped += delta.rejected
-        self.refused.extend(delta.reasons)
-        self._note_forgotten(delta)
-        self.replica.follow(delta)
-
-    def _note_forgotten(self, delta: Delta) -> None:
-        """Name the objects that the delta drops: the graph still has them."""
-        for operation in delta.operations:
-            if not isinstance(operation, DropNode):
-                continue
-            node = self.replica.graph.get(Object, operation.id)
-            if node is not None:
-                self.forgotten.append(node.label)
-
-    def _on_health(self, health: Health) -> None:
-        self.health[health.instance] = health
-        shares = self._busy.setdefault(health.instance, [])
-        shares.append(health.busy)
 
     def _on_command(self, command: MotorCommand, envelope: Envelope, received_ns: int) -> None:
         cycle_ns = received_ns - envelope.born_ns
@@ -174,11 +173,7 @@ class Tally:
     @property
     def busy(self) -> dict[str, float]:
         """The mean share of its time that each instance was computing."""
-        means = {}
-        for instance in sorted(self._busy):
-            shares = self._busy[instance]
-            means[instance] = sum(shares) / len(shares)
-        return means
+        return {name: fmean(shares) for name, shares in sorted(self._busy.items())}
 
     def gaps(self, own: Counter[str]) -> dict[str, int]:
         """Messages lost for good on each NEVER_DROP topic, by the count of whoever lost most: the
@@ -187,13 +182,8 @@ class Tally:
         reported = [health.gaps for health in self.health.values()]
         counts: list[Mapping[str, int]] = [own, *reported]
 
-        gaps = {}
-        for topic in topics.ALL:
-            if topic.delivery is not Delivery.NEVER_DROP:
-                continue
-            lost = [count.get(topic.name, 0) for count in counts]
-            gaps[topic.name] = max(lost)
-        return gaps
+        names = [topic.name for topic in topics.ALL if topic.delivery is Delivery.NEVER_DROP]
+        return {name: max(count.get(name, 0) for count in counts) for name in names}
 
     def rejected(self, own: Counter[str]) -> dict[str, int]:
         """Messages that were rejected, by topic, summed over the modules and `own`."""

@@ -1,4 +1,4 @@
-"""Follows a run on its bus: what its messages amount to, and which processes are ready."""
+"""Follows a run on its bus: its messages, and which of its processes are ready."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Arrival, Bus, Member
 from cogmap.cli.launch.plan import OBSERVER
 from cogmap.cli.launch.tally import FOLLOWED, Tally
-from cogmap.errors import MessageError
 from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
@@ -39,8 +38,13 @@ class Watch:
             bus.declare(topic)
         for topic in FOLLOWED:
             bus.subscribe(topic, self._inbox.put, self._intake.count_lost)
-        bus.watch(lambda member, alive: self._inbox.call(lambda: self._on_presence(member, alive)))
+        bus.watch(self._on_presence)
         bus.announce(Member(OBSERVER, OBSERVER))
+
+    def _on_presence(self, member: Member, alive: bool) -> None:
+        """Have the thread that pumps take account of who came or went."""
+        change = self.present.add if alive else self.present.discard
+        self._inbox.call(lambda: change(member))
 
     def pump(self, timeout_s: float) -> bool:
         """Receive all that has arrived, waiting up to `timeout_s` for the first. False where none
@@ -51,7 +55,7 @@ class Watch:
         while item is not None:
             if isinstance(item, Arrival):
                 moved |= item.topic is not topics.HEALTH
-                self._receive(item)
+                self.tally.receive(item, self._intake)
             else:
                 item()
             item = self._inbox.take(0.0)
@@ -63,21 +67,6 @@ class Watch:
         while (left_s := until_s - time.monotonic()) > 0:
             if self.pump(left_s):
                 until_s = time.monotonic() + quiet_s
-
-    def _on_presence(self, member: Member, alive: bool) -> None:
-        if alive:
-            self.present.add(member)
-        else:
-            self.present.discard(member)
-
-    def _receive(self, arrival: Arrival) -> None:
-        message = self._intake.accept(arrival)
-        if message is None or arrival.envelope is None:
-            return
-        try:
-            self.tally.update(message, arrival.envelope, arrival.received_ns)
-        except MessageError as error:
-            self._intake.reject(arrival.topic.name, str(error))
 
     def publish(self, message: Message) -> None:
         """Publish a message of one of the topics PUBLISHED."""
@@ -93,11 +82,7 @@ class Watch:
     def missing(self, awaited: Mapping[str, int]) -> list[str]:
         """The modules of which not all instances are ready yet."""
         ready = Counter(member.module for member in self.present)
-        missing = []
-        for name, number in awaited.items():
-            if ready[name] < number:
-                missing.append(name)
-        return missing
+        return [name for name, number in awaited.items() if ready[name] < number]
 
     def gaps(self) -> dict[str, int]:
         """Messages lost for good on each NEVER_DROP topic, by the count of whoever lost most."""

@@ -4,41 +4,35 @@ from __future__ import annotations
 
 import click
 
-from cogmap.cli.log.drive import draw_map, summary
-from cogmap.cli.log.inspect import cat, diff, info, recover
-from cogmap.cli.log.pictures import image, perception
-from cogmap.cli.log.record import record
-from cogmap.cli.log.replay import replay
+from cogmap.cli.verbs import add_verbs
 
+VERBS = {
+    "record": ("cogmap.cli.log.record:record", "Record the bus into an MCAP file."),
+    "info": ("cogmap.cli.log.inspect:info", "Show what is in a log, and what is missing."),
+    "summary": ("cogmap.cli.log.summary:summary", "Summarise the drive in a log."),
+    "cat": ("cogmap.cli.log.inspect:cat", "Print messages."),
+    "map": ("cogmap.cli.log.summary:draw_map", "Draw the true town and the learned map."),
+    "image": ("cogmap.cli.log.pictures:image", "Save a camera image."),
+    "perception": ("cogmap.cli.log.pictures:perception", "Draw what was perceived in a view."),
+    "replay": ("cogmap.cli.log.replay:replay", "Play a log onto the bus, or into modules."),
+    "diff": ("cogmap.cli.log.inspect:diff", "Compare two logs message by message."),
+    "recover": ("cogmap.cli.log.inspect:recover", "Save what is readable of a cut log."),
+}
 _EPILOG = """\b
-A first session, with `cogmap run` going on in another terminal:
+A first session, while `cogmap run` runs in another terminal:
   cogmap log record -o drive.mcap     Ctrl-C ends it
   cogmap log info drive.mcap          what is in it
   cogmap log summary drive.mcap       how the drive went
-  cogmap log map drive.mcap           the town and what was learned of it
+  cogmap log map drive.mcap           the true town and the learned map
   cogmap log cat drive.mcap action/selected
-  cogmap log image drive.mcap         a view, as a file
+  cogmap log image drive.mcap         a camera image, as a file
   cogmap log replay drive.mcap --into sensory
 """
 
 
 @click.group(epilog=_EPILOG)
 def log() -> None:
-    """Record what travels on the bus; look at it, draw what was seen, play it back, compare it,
-    recover it.
-    """
+    """Record all messages on the bus; inspect, draw, replay, compare and recover logs."""
 
 
-for _command in (
-    record,
-    info,
-    summary,
-    cat,
-    draw_map,
-    image,
-    perception,
-    replay,
-    diff,
-    recover,
-):
-    log.add_command(_command)
+add_verbs(log, VERBS)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from itertools import islice
 from pathlib import Path
@@ -11,9 +10,10 @@ from typing import Any
 import click
 import msgspec
 
-from cogmap.cli.log import formatting
-from cogmap.cli.log.progress import bar
+from cogmap.cli.log import report
 from cogmap.cli.options import FiniteRange, json_option
+from cogmap.cli.printing import print_json
+from cogmap.cli.progress import bar
 from cogmap.errors import MessageError
 from cogmap.recording import diff as differ
 from cogmap.recording import info as informer
@@ -40,26 +40,26 @@ log_argument = click.argument("log", type=click.Path(path_type=Path))
 @log_argument
 @json_option
 def info(log: Path, as_json: bool) -> None:
-    """Show what is in LOG: how long, how big, how much of what from whom, and what is missing."""
+    """Show the length, size, topics and publishers of LOG, and what is missing in it."""
     with bar(f"reading {log.name}") as progress:
         found = informer.info(log, progress)
     if as_json:
-        formatting.print_json(found)
+        print_json(found)
     else:
-        formatting.print_info(found)
+        report.print_info(found)
 
 
 @click.command(epilog=_CAT_EPILOG)
 @log_argument
 @click.argument("topics", nargs=-1)
-@click.option("-n", "number", type=click.IntRange(min=1), help="At most so many messages.")
+@click.option("-n", "number", type=click.IntRange(min=1), help="Print at most this many messages.")
 @click.option(
     "--start-offset",
     type=FiniteRange(min=0),
     default=0.0,
-    help="Begin so many seconds into the log.",
+    help="Begin this many seconds after the start of the log.",
 )
-@click.option("--full", is_flag=True, help="Print every value of arrays.")
+@click.option("--full", is_flag=True, help="Print all values of arrays.")
 @json_option
 def cat(
     log: Path,
@@ -69,18 +69,16 @@ def cat(
     full: bool,
     as_json: bool,
 ) -> None:
-    """Print the messages in LOG, of all topics or of those named. With --json, a line each."""
+    """Print the messages in LOG, of all topics or of TOPICS; with --json, one per line."""
     reader = LogReader(log)
     start_ns = reader.span_ns[0] + int(start_offset * 1e9)
     chosen = reader.records(selection.named(topics) or None)
     later = (record for record in chosen if record.log_time_ns >= start_ns)
-    try:
-        for record in islice(later, number):
-            click.echo(
-                _as_json(reader, record, full) if as_json else _as_text(reader, record, full)
-            )
-    except BrokenPipeError:  # its reader has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    for record in islice(later, number):
+        if as_json:
+            click.echo(_as_json(reader, record, full))
+        else:
+            click.echo(_as_text(reader, record, full))
 
 
 @click.command(epilog=_DIFF_EPILOG)
@@ -89,17 +87,17 @@ def cat(
 @click.argument("topics", nargs=-1)
 @json_option
 def diff(left: Path, right: Path, topics: tuple[str, ...], as_json: bool) -> None:
-    """Compare two logs message by message, on all topics of the model or on those named.
+    """Compare two logs message by message, on all topics of the model or on TOPICS.
 
-    Exit code 1, and the first difference in words, where a byte differs. How messages travelled is
-    not compared.
+    Ends with 1 if a byte differs, and describes the first difference. Times of sending and
+    receiving are not compared.
     """
     with bar("comparing") as progress:
         found = differ.diff(left, right, selection.named(topics) or None, progress)
     if as_json:
-        formatting.print_json(found)
+        print_json(found)
     else:
-        formatting.print_diff(found)
+        report.print_diff(found)
     if not found.same:
         sys.exit(1)
 
@@ -109,13 +107,13 @@ def diff(left: Path, right: Path, topics: tuple[str, ...], as_json: bool) -> Non
 @click.argument("target", metavar="OUT", type=click.Path(path_type=Path))
 @json_option
 def recover(source: Path, target: Path, as_json: bool) -> None:
-    """Save into OUT what can be read of IN, a log that was cut off or damaged."""
+    """Save what is readable of IN, a log that was cut off or damaged, as the new log OUT."""
     with bar(f"recovering {source.name}") as progress:
         recovery = rescuer.recover(source, target, progress)
     if as_json:
-        formatting.print_json(recovery)
+        print_json(recovery)
     else:
-        formatting.print_recovery(recovery)
+        report.print_recovery(recovery)
 
 
 def _as_json(reader: LogReader, record: Record, full: bool) -> str:

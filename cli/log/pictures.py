@@ -1,4 +1,4 @@
-"""`cogmap log image` and `perception`: what was seen, as pictures."""
+"""`cogmap log image` and `perception`: camera images and percepts as pictures."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from pathlib import Path
 import click
 import msgspec
 
-from cogmap.cli.log import formatting
-from cogmap.cli.log.files import save
-from cogmap.cli.log.progress import bar
+from cogmap.cli.files import check_picture, save
 from cogmap.cli.options import FiniteRange, json_option
-from cogmap.errors import LogError, UsageError
+from cogmap.cli.printing import print_json
+from cogmap.cli.progress import bar
+from cogmap.errors import LogError
 from cogmap.recording import views
 from cogmap.recording.storage.reader import LogReader
-from cogmap.recording.views import CameraFrame, Depth
+from cogmap.recording.views import CameraFrame
 from cogmap.schemas import topics
 from cogmap.schemas.sensing import Percepts, StereoFrame, View
 from cogmap.schemas.topics import Topic
@@ -25,23 +25,21 @@ PLOTS = (".png", ".pdf")
 MIN_FOCAL_LENGTH_PX = 1.0
 _IMAGE_EPILOG = """\b
 Examples:
-  cogmap log image drive.mcap                          the view in the middle of the log
-  cogmap log image drive.mcap --frame 40 --percepts    what was recognised in it, outlined
-  cogmap log image drive.mcap --at 12.5 --depth        how far away what it shows is, in colours
+  cogmap log image drive.mcap                          the image in the middle of the log
+  cogmap log image drive.mcap --frame 40 --percepts    with the recognised objects outlined
+  cogmap log image drive.mcap --at 12.5 --depth        depth in colours
   cogmap log image drive.mcap --camera right -o right.jpg
 """
 _PERCEPTION_EPILOG = """\b
 Examples:
-  cogmap log perception drive.mcap                     the view in which most is recognised
+  cogmap log perception drive.mcap                     the view with most recognised objects
   cogmap log perception drive.mcap --at 12.5 -o figure.pdf
 """
 _Command = Callable[..., None]
 
 
 class Picture(msgspec.Struct, frozen=True):
-    """A file that was written, and which frame of the log it shows; `at_s` counts from the log's
-    first message.
-    """
+    """A file that was written, and the frame that it shows, `at_s` after the log began."""
 
     path: str
     topic: str
@@ -52,21 +50,21 @@ class Picture(msgspec.Struct, frozen=True):
 
 
 def _frame_options(command: _Command) -> _Command:
-    """The options for which frame to show, and which file to write."""
+    """Add the options that choose the frame to show and the file to write."""
     options = (
         json_option,
         click.option(
             "-o",
             "--output",
             type=click.Path(path_type=Path),
-            help="The file; named by the frame otherwise.",
+            help="The picture.  [default: named after LOG and the frame]",
         ),
         click.option(
             "--at",
             "at_s",
             type=FiniteRange(min=0),
             metavar="SECONDS",
-            help="Nearest to this time.",
+            help="The frame nearest to this time of the log.",
         ),
         click.option(
             "--frame", type=click.IntRange(min=0), metavar="N", help="The frame with this number."
@@ -80,10 +78,10 @@ def _frame_options(command: _Command) -> _Command:
 
 @click.command(epilog=_IMAGE_EPILOG)
 @click.option(
-    "--camera", type=click.Choice(["left", "right"]), help="As this camera gave it, not rectified."
+    "--camera", type=click.Choice(["left", "right"]), help="The unrectified image of this camera."
 )
-@click.option("--depth", is_flag=True, help="Its depth, in colours, with a scale.")
-@click.option("--percepts", is_flag=True, help="Outline and name what was recognised in it.")
+@click.option("--depth", is_flag=True, help="Show depth in colours, with a scale.")
+@click.option("--percepts", is_flag=True, help="Outline and name the recognised objects.")
 @_frame_options
 def image(
     log: Path,
@@ -95,32 +93,42 @@ def image(
     depth: bool,
     percepts: bool,
 ) -> None:
-    """Save a view in LOG as an image file: a recorded pixel a pixel, as PNG or JPEG.
+    """Save a camera image in LOG, as PNG or JPEG.
 
-    That is the rectified left image, of which depth and percepts are; --camera gives the image of a
-    camera as it was. Without --frame or --at it is the view in the middle. With --depth or
-    --percepts each pixel is several wide.
+    It is the rectified left image, which depth and percepts refer to, or with --camera the image
+    of a camera as it was taken. Without --frame or --at it is the image in the middle of LOG.
+    With --depth or --percepts the image is enlarged.
     """
     if camera and (depth or percepts):
         raise click.UsageError(
-            "depth and percepts are of the rectified view: leave --camera out, or --depth and "
+            "depth and percepts refer to the rectified view: leave out --camera, or --depth and "
             "--percepts"
         )
+    from cogmap.cli.plots import draw
+
     reader = LogReader(log)
     topic = topics.STEREO if camera else topics.VIEW
     frames = _frames(reader, topic, percepts)
     chosen = _chosen(reader, frames, frame, at_s) or frames[len(frames) // 2]
-
-    kind = _kind(camera, depth, percepts)
+    shown = [camera, "depth" if depth else None, "percepts" if percepts else None]
+    kind = "-".join(filter(None, shown)) or "view"
     path = _output(output, log, chosen, kind, IMAGES)
-    suffix = path.suffix.lower()
+
+    name = f"{log}, frame {chosen.number}"
+    message = views.message(reader, chosen.record)
     recognised = views.percepts(reader, chosen) if percepts else None
-    if camera:
-        content = _camera_image(reader, chosen, camera, suffix)
+    if isinstance(message, StereoFrame):
+        pixels = views.image(message.left if camera == "left" else message.right, name)
     else:
-        content = _view_image(reader, chosen, depth, recognised, suffix)
-    save(path, content)
-    _report(_picture(path, topic, chosen, recognised), log, as_json)
+        assert isinstance(message, View)
+        pixels = views.image(message.image, name)
+        depth_m = views.depth(message.depth_m, name) if depth else None
+        if depth_m is not None or recognised is not None:
+            objects = recognised.objects if recognised is not None else []
+            pixels = draw.draw_view(pixels, depth_m, message.calibration, objects)
+
+    save(path, draw.encode_image(pixels, path.suffix.lower()))
+    _report(path, topic, chosen, recognised, log, as_json)
 
 
 @click.command(epilog=_PERCEPTION_EPILOG)
@@ -128,11 +136,10 @@ def image(
 def perception(
     log: Path, frame: int | None, at_s: float | None, output: Path | None, as_json: bool
 ) -> None:
-    """Draw what perception made of a view in LOG: figure 3 of the paper, as PNG or PDF.
+    """Draw how a view in LOG was perceived, as figure 3 of the paper, as PNG or PDF.
 
-    Camera image, depth, segments with their names, the road in the image, and from above the
-    projected road with the objects where they stand. Without --frame or --at it is the view in
-    which most is recognised.
+    Camera image, depth, segments with their names, the road in the image, and the road and the
+    objects seen from above. Without --frame or --at it is the view with most recognised objects.
     """
     reader = LogReader(log)
     frames = _frames(reader, topics.VIEW, True)
@@ -140,10 +147,23 @@ def perception(
     path = _output(output, log, chosen, "perception", PLOTS)
 
     recognised = views.percepts(reader, chosen)
+    view = views.message(reader, chosen.record)
     assert recognised is not None
-    content = _perception_plot(reader, chosen, recognised, path.suffix.lower())
-    save(path, content)
-    _report(_picture(path, topics.VIEW, chosen, recognised), log, as_json)
+    assert isinstance(view, View)
+    name = f"{log}, frame {chosen.number}"
+    if min(view.calibration.fx_px, view.calibration.fy_px) < MIN_FOCAL_LENGTH_PX:
+        raise LogError(
+            f"{name}: its calibration's focal lengths must be at least 1 pixel: choose another "
+            "frame"
+        )
+
+    from cogmap.cli.plots.perception import figure  # matplotlib takes long to import
+
+    pixels = views.image(view.image, name)
+    depth_m = views.depth(view.depth_m, name)
+    title = f"Perception in frame {chosen.number}, {chosen.at_s:.1f} s into {log.name}"
+    save(path, figure(view, pixels, depth_m, recognised, title, path.suffix.lower()))
+    _report(path, topics.VIEW, chosen, recognised, log, as_json)
 
 
 def _frames(reader: LogReader, topic: Topic, recognised: bool) -> list[CameraFrame]:
@@ -166,97 +186,30 @@ def _chosen(
     return None
 
 
-def _kind(camera: str | None, depth: bool, percepts: bool) -> str:
-    """What an image shows, as the name of its file has it."""
-    parts = [camera or "", "depth" if depth else "", "percepts" if percepts else ""]
-    return "-".join(filter(None, parts)) or "view"
-
-
 def _output(
     output: Path | None, log: Path, frame: CameraFrame, kind: str, suffixes: tuple[str, ...]
 ) -> Path:
-    """Where to write. Raises UsageError where that cannot be a file of one of the kinds in
-    `suffixes`.
-    """
+    """The file to write. Raises UsageError if it cannot be one of the kinds in `suffixes`."""
     path = output or Path(f"{log.stem}-frame-{frame.number}-{kind}{suffixes[0]}")
-    if path.suffix.lower() not in suffixes:
-        raise UsageError(f"-o {path}: name a file that ends in {' or '.join(suffixes)}")
-    if not path.parent.is_dir():
-        raise UsageError(f"-o {path}: there is no folder {path.parent}: make it first")
+    check_picture("-o", path, suffixes)
     return path
 
 
-def _camera_image(reader: LogReader, frame: CameraFrame, camera: str, suffix: str) -> bytes:
-    """A camera's image as a file. Raises LogError."""
-    from cogmap.cli.plots import draw
-
-    message = views.message(reader, frame.record)
-    assert isinstance(message, StereoFrame)
-    array = message.left if camera == "left" else message.right
-    return draw.encode_image(views.image(array, _name(reader, frame)), suffix)
-
-
-def _view_image(
-    reader: LogReader, frame: CameraFrame, depth: bool, recognised: Percepts | None, suffix: str
-) -> bytes:
-    """A view as a file, drawn over where depth or percepts are to be shown. Raises LogError."""
-    from cogmap.cli.plots import draw
-
-    view = _view(reader, frame)
-    name = _name(reader, frame)
-    pixels = views.image(view.image, name)
-    depth_m: Depth | None = views.depth(view.depth_m, name) if depth else None
-    if depth_m is not None or recognised is not None:
-        objects = recognised.objects if recognised is not None else []
-        pixels = draw.draw_view(pixels, depth_m, view.calibration, objects)
-    return draw.encode_image(pixels, suffix)
-
-
-def _perception_plot(
-    reader: LogReader, frame: CameraFrame, recognised: Percepts, suffix: str
-) -> bytes:
-    """The plot of a view and its percepts as a file. Raises LogError."""
-    from cogmap.cli.plots import perception as plot  # other commands have no use for matplotlib
-
-    view = _view(reader, frame)
-    name = _name(reader, frame)
-    focal_px = min(view.calibration.fx_px, view.calibration.fy_px)
-    if focal_px < MIN_FOCAL_LENGTH_PX:
-        raise LogError(
-            f"{name}: its calibration's focal lengths must be at least 1 pixel: choose another "
-            "frame"
-        )
-    pixels = views.image(view.image, name)
-    depth_m = views.depth(view.depth_m, name)
-    place = f"frame {frame.number}, {frame.at_s:.1f} s into {reader.path.name}"
-    title = f"What was perceived in {place}"
-    return plot.figure(view, pixels, depth_m, recognised, title, suffix)
-
-
-def _view(reader: LogReader, frame: CameraFrame) -> View:
-    message = views.message(reader, frame.record)
-    assert isinstance(message, View)
-    return message
-
-
-def _name(reader: LogReader, frame: CameraFrame) -> str:
-    return f"{reader.path}, frame {frame.number}"
-
-
-def _picture(path: Path, topic: Topic, frame: CameraFrame, recognised: Percepts | None) -> Picture:
-    objects = None
-    if recognised is not None:
-        objects = [percept.label for percept in recognised.objects]
-    return Picture(str(path), topic.name, frame.number, frame.stamp_ns, frame.at_s, objects)
-
-
-def _report(picture: Picture, log: Path, as_json: bool) -> None:
-    """Print which file was written and what it shows."""
+def _report(
+    path: Path,
+    topic: Topic,
+    frame: CameraFrame,
+    recognised: Percepts | None,
+    log: Path,
+    as_json: bool,
+) -> None:
+    """Print the name of the file that was written, and what it shows."""
+    objects = None if recognised is None else [each.label for each in recognised.objects]
     if as_json:
-        formatting.print_json(picture)
+        number = frame.number
+        print_json(Picture(str(path), topic.name, number, frame.stamp_ns, frame.at_s, objects))
         return
-    shown = ""
-    if picture.objects is not None:
-        shown = f", with {', '.join(picture.objects) or 'nothing recognised'}"
-    place = f"frame {picture.frame} at {picture.at_s:.3f} s of {log}"
-    click.echo(f"{picture.path}: {picture.topic}, {place}{shown}")
+
+    shown = "" if objects is None else f", with {', '.join(objects) or 'nothing recognised'}"
+    place = f"frame {frame.number} at {frame.at_s:.3f} s of {log}"
+    click.echo(f"{path}: {topic.name}, {place}{shown}")

@@ -8,9 +8,8 @@ from pathlib import Path
 import click
 
 from cogmap.bus.zenoh_bus import ZenohBus
-from cogmap.cli.log import formatting
+from cogmap.cli.log import report
 from cogmap.cli.log.keys import Keys
-from cogmap.cli.log.progress import bar
 from cogmap.cli.options import (
     FiniteRange,
     agent_option,
@@ -19,6 +18,8 @@ from cogmap.cli.options import (
     json_option,
     set_option,
 )
+from cogmap.cli.printing import print_json
+from cogmap.cli.progress import bar
 from cogmap.recording import selection
 from cogmap.recording.replaying.player import Choices, Player
 from cogmap.recording.replaying.replay import replay_into
@@ -30,20 +31,26 @@ from cogmap.services import registry
 CLOCK_HZ = 40.0
 _EPILOG = """\b
 Examples:
-  cogmap log replay drive.mcap                      onto the bus, as it was
+  cogmap log replay drive.mcap                      onto the bus, as recorded
   cogmap log replay drive.mcap -r 2 -l              twice as fast, again and again
   cogmap log replay drive.mcap --topics odometry --topics camera/stereo --clock
-  cogmap log replay drive.mcap --into sensory       does it still publish the same?
+  cogmap log replay drive.mcap --into sensory       is its output still the same?
   cogmap log replay drive.mcap --into epam --set epam.percept_threshold=0.6
 """
 
 
 @click.command(epilog=_EPILOG)
 @click.argument("log", type=click.Path(path_type=Path))
-@click.option("-r", "--rate", type=FiniteRange(min=0, min_open=True), help="So many times as fast.")
-@click.option("--topics", multiple=True, metavar="TOPIC", help="Only this one; repeat at will.")
-@click.option("--start-offset", type=FiniteRange(min=0), help="Begin so many seconds into the log.")
-@click.option("-l", "--loop", is_flag=True, help="Begin again at the end.")
+@click.option(
+    "-r", "--rate", type=FiniteRange(min=0, min_open=True), help="Play this many times as fast."
+)
+@click.option(
+    "--topics", multiple=True, metavar="TOPIC", help="Play only this topic; may be repeated."
+)
+@click.option(
+    "--start-offset", type=FiniteRange(min=0), help="Begin this many seconds after the start."
+)
+@click.option("-l", "--loop", is_flag=True, help="Play again and again.")
 @click.option(
     "--start-paused", is_flag=True, help="Begin paused; the space bar continues and pauses."
 )
@@ -54,10 +61,13 @@ Examples:
     is_flag=False,
     flag_value=CLOCK_HZ,
     metavar="[HZ]",
-    help=f"Publish on the clock how far it is, so often a second ({CLOCK_HZ:g} unless given).",
+    help=f"Publish the time of the log on the clock, at this rate.  [default: {CLOCK_HZ:g}]",
 )
 @click.option(
-    "--into", multiple=True, metavar="MODULE", help="Feed this module and compare; repeat at will."
+    "--into",
+    multiple=True,
+    metavar="MODULE",
+    help="Feed the log to this module and compare; may be repeated.",
 )
 @connect_option
 @agent_option
@@ -81,17 +91,27 @@ def replay(
 ) -> None:
     """Play LOG back onto the bus, or feed it to modules with --into.
 
-    With --into, each recorded instance of the module receives what it received then, in the same
-    order and with the recorded configuration, and what it publishes is compared with the log: exit
-    code 1, and the first difference in words, where a byte differs.
+    With --into, each recorded instance of the module receives the recorded messages in the same
+    order, with the recorded configuration, and its output is compared with the log. Ends with 1 if
+    a byte differs, and describes the first difference.
     """
     overrides = config.load(config_path, settings)
     if into:
         if rate or topics or start_offset or loop or start_paused or clock_hz:
             raise click.UsageError(
-                "--into replays everything as fast as it can: leave the options of playing out"
+                "--into replays everything as fast as it can: leave out the options of playing"
             )
-        _into(log, into, overrides, as_json)
+        for name in into:
+            registry.config_type(name)
+
+        with bar(f"replaying {', '.join(into)}") as progress:
+            found = replay_into(log, into, registry.build, overrides=overrides, progress=progress)
+        if as_json:
+            print_json(found)
+        else:
+            report.print_report(found)
+        if not found.same:
+            sys.exit(1)
         return
 
     if overrides:
@@ -103,26 +123,8 @@ def replay(
         loop=loop,
         clock_hz=clock_hz or 0.0,
     )
-    _onto_bus(LogReader(log), choices, ZenohBus(connect, agent), start_paused, as_json)
-
-
-def _into(log: Path, modules: tuple[str, ...], overrides: config.Sections, as_json: bool) -> None:
-    for name in modules:
-        registry.config_type(name)
-
-    with bar(f"replaying {', '.join(modules)}") as progress:
-        report = replay_into(log, modules, registry.build, overrides=overrides, progress=progress)
-    if as_json:
-        formatting.print_json(report)
-    else:
-        formatting.print_report(report)
-    if not report.same:
-        sys.exit(1)
-
-
-def _onto_bus(
-    reader: LogReader, choices: Choices, bus: ZenohBus, start_paused: bool, as_json: bool
-) -> None:
+    reader = LogReader(log)
+    bus = ZenohBus(connect, agent)
     try:
         with Keys(Stop(), start_paused).listening() as keys:
             played = Player(reader, bus, choices, keys).play()
@@ -130,6 +132,6 @@ def _onto_bus(
         bus.close()
 
     if as_json:
-        formatting.print_json(played)
+        print_json(played)
     else:
-        formatting.print_played(played)
+        report.print_played(played)

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import click
 
-from cogmap.cli.memory.inspect import check, show
-from cogmap.cli.memory.transfer import export, import_
+from cogmap.cli.verbs import add_verbs
 
+VERBS = {
+    "show": ("cogmap.cli.memory.show:show", "Show how many records of each kind there are."),
+    "check": ("cogmap.cli.memory.show:check", "Check every page and every record."),
+    "export": ("cogmap.cli.memory.transfer:export", "Write all records as JSON lines."),
+    "import": ("cogmap.cli.memory.transfer:import_", "Make a database from an export."),
+}
 _EPILOG = """\b
 Examples:
   cogmap memory show memory.db
@@ -17,11 +22,10 @@ Examples:
 
 @click.group(epilog=_EPILOG)
 def memory() -> None:
-    """Look into the database of long-term memory; check, export and import it.
+    """Show, check, export and import the database of long-term memory.
 
-    No other process may have the database open meanwhile.
+    No other process may have the database open at the same time.
     """
 
 
-for _command in (show, check, export, import_):
-    memory.add_command(_command)
+add_verbs(memory, VERBS)

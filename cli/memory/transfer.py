@@ -7,9 +7,9 @@ from pathlib import Path
 
 import click
 
-from cogmap.cli.log.progress import bar
 from cogmap.cli.memory import lines
-from cogmap.cli.memory.source import checked, database_argument, existing_file
+from cogmap.cli.memory.show import checked, database_argument, existing_file
+from cogmap.cli.progress import bar
 from cogmap.runtime.state.database import write_new
 from cogmap.runtime.state.new_file import new_file
 from cogmap.runtime.state.record import Record
@@ -23,8 +23,8 @@ _new_path = click.Path(path_type=Path)
 def export(path: Path, target: Path) -> None:
     """Write all records of FILE into OUT.jsonl, a new file of JSON lines.
 
-    Its first line has format, version and count; each line after it has a record's key, kind,
-    payload in base64, and digest. The file appears once it is whole.
+    The first line has format, version and count; each line after it has a record's key, kind,
+    payload in base64, and digest. OUT.jsonl appears only when it is complete.
     """
     with checked(path) as database, new_file(target) as made:
         count = database.count
@@ -39,9 +39,9 @@ def export(path: Path, target: Path) -> None:
 @click.argument("source", metavar="OUT.jsonl", type=existing_file)
 @click.argument("path", metavar="FILE", type=_new_path)
 def import_(source: Path, path: Path) -> None:
-    """Make the new database FILE of an export.
+    """Make the new database FILE from the export OUT.jsonl.
 
-    Every digest and the count are checked; where one does not fit, FILE is not made.
+    Every digest and the count are checked; if one is wrong, FILE is not made.
     """
     with source.open("rb") as file, bar(f"reading {source.name}") as progress:
         count = lines.head(source, file.readline()).count
@@ -54,7 +54,7 @@ def import_(source: Path, path: Path) -> None:
 def _followed(
     records: Iterable[Record], count: int, progress: Callable[[float], None]
 ) -> Iterator[Record]:
-    """The same records, with `progress` told the share of `count` that has passed."""
+    """Yield the same records, and report to `progress` the share of `count` that has passed."""
     for number, record in enumerate(records, start=1):
         progress(min(1.0, number / max(count, 1)))
         yield record

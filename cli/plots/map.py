@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cogmap.cli.launch.metrics import RecordedMetrics
+from cogmap.cli.launch.drive_metrics import RecordedMetrics
 from cogmap.cli.launch.observer import Observer
 from cogmap.cli.plots import map_layers as layers
 from cogmap.cli.plots import palette

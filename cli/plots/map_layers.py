@@ -8,7 +8,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Ellipse
 from matplotlib.transforms import Affine2D, Transform
 
-from cogmap.cli.launch.metrics import objects, position_m
+from cogmap.cli.launch.drive_metrics import objects, position_m
 from cogmap.cli.launch.observer import Observer
 from cogmap.cli.plots.palette import OBJECT, ROAD, ROAD_OPACITY
 from cogmap.graph.graph import Graph

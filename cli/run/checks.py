@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from cogmap.cli.launch.plan import MEMORY, Choices
-from cogmap.cli.memory.source import checked
+from cogmap.cli.memory.show import checked
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
 from cogmap.runtime.run import SECTION, Run

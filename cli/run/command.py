@@ -5,78 +5,26 @@ from __future__ import annotations
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
 from cogmap.cli.launch.command_line import ONE_THREAD
 from cogmap.cli.launch.forking.client import fork_server
 from cogmap.cli.options import FiniteRange, agent_option, config_option, connect_option, set_option
+from cogmap.cli.run.options import (
+    LAP_LIMIT_S,
+    codelets_option,
+    energy_option,
+    explore_option,
+    goals_option,
+    laps_option,
+    lockstep_option,
+    seed_option,
+    tour_option,
+    town_option,
+)
 from cogmap.runtime import config
 from cogmap.services import registry
-
-if TYPE_CHECKING:
-    from cogmap.cli.launch.plan import Choices
-
-LAP_LIMIT_S = 85.0
-AROUND_S = 30.0
-
-seed_option = click.option(
-    "--seed", type=click.IntRange(0, 2**32), help="Which town, and which noise.  [default: 1]"
-)
-
-
-def _known_town(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
-    """Refuse a town that there is none of. Raises ConfigError."""
-    if value is not None:
-        from cogmap.services.sim.layout import towns
-
-        towns.check(value)
-    return value
-
-
-town_option = click.option(
-    "--town",
-    metavar="TOWN",
-    callback=_known_town,
-    help="loop, blocks, or osm:FILE, the extract of OpenStreetMap in FILE.  [default: loop]",
-)
-tour_option = click.option(
-    "--tour",
-    is_flag=True,
-    help="In a town of blocks: explore, plan the order of three goals, find round a closed street.",
-)
-goals_option = click.option(
-    "--goals",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Drive to the goals in FILE, one a line: a name, or x and y; end at the last.",
-)
-explore_option = click.option(
-    "--explore",
-    "explore_s",
-    type=FiniteRange(1, 1e5),
-    metavar="SECONDS",
-    help="Explore for so long, then drive to the goals, or home to where it started.",
-)
-energy_option = click.option(
-    "--energy",
-    is_flag=True,
-    help="The robot's battery runs down, and is charged at charging places in the town.",
-)
-laps_option = click.option(
-    "--laps",
-    type=FiniteRange(0, 1000, min_open=True),
-    help="Goals in the loop of streets: its corners, in order, so many times round.  [default: 1]",
-)
-codelets_option = click.option(
-    "--codelets", type=click.IntRange(1, 64), default=1, show_default=True, help="How many workers."
-)
-lockstep_option = click.option(
-    "--lockstep/--real-time",
-    help="Wait for every answer, the same bytes each time; or drive as time passes.  "
-    "[default: real time]",
-)
 
 
 @click.command()
@@ -160,7 +108,7 @@ def run(
         os.environ.update(ONE_THREAD)
         from cogmap.cli.goal import read_goals
         from cogmap.cli.launch.plan import Choices
-        from cogmap.cli.run.drive import Start, run_drive
+        from cogmap.cli.run.execution import Start, run_drive
 
         choices = Choices(
             seed=seed,
@@ -188,18 +136,3 @@ def run(
         )
         code = run_drive(start, server)
     sys.exit(code)
-
-
-def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
-    """The time limit of a drive with these settings of the simulation.
-
-    It grows with each lap, and is one lap's at least; without laps it is the drive's duration, and
-    time to start and to end.
-    """
-    from cogmap.services.sim.layout.towns import LOOP
-
-    has_laps = not (choices.tour or choices.goals or choices.explore_s)
-    if sim["town"] == LOOP and has_laps:
-        return LAP_LIMIT_S * max(1.0, choices.laps or 1.0)
-
-    return float(sim["duration_s"]) + AROUND_S

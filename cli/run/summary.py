@@ -11,8 +11,9 @@ import msgspec
 from rich.markup import escape
 from rich.table import Table
 
+from cogmap.cli.files import LOG_NAME
 from cogmap.cli.launch.drive import Drive
-from cogmap.cli.launch.metrics import (
+from cogmap.cli.launch.drive_metrics import (
     DriveMetrics,
     ErrorMetrics,
     RecordedMetrics,
@@ -21,7 +22,6 @@ from cogmap.cli.launch.metrics import (
     drive_metrics,
 )
 from cogmap.cli.launch.outcome import Ending, Outcome
-from cogmap.cli.launch.plan import LOG_NAME
 from cogmap.cli.launch.tally import EnergyMetrics
 from cogmap.cli.launch.watch import Watch
 
@@ -72,7 +72,10 @@ def _draw_map(path: Path, watch: Watch, metrics: RunMetrics) -> None:
 
 def table(metrics: RunMetrics, folder: Path) -> Table:
     """The metrics that matter most."""
-    title = f"{metrics.ended_by}: {metrics.reason}\n{folder}"
+    reason = metrics.reason
+    if not reason.startswith(metrics.ended_by):
+        reason = f"{metrics.ended_by}: {reason}"
+    title = f"{reason}\n{folder}"
     rows = drive_rows(metrics)
     rows += _loss_rows(metrics, "not recorded")
     rows += _process_rows(metrics)

@@ -30,13 +30,9 @@ def streamed_topic(name: str) -> Topic:
     return topic
 
 
-def _convert(context: click.Context, parameter: click.Parameter, value: str) -> Topic:
-    return topic_named(value)
-
-
-def _convert_streamed(context: click.Context, parameter: click.Parameter, value: str) -> Topic:
-    return streamed_topic(value)
-
-
-topic_argument = click.argument("topic", metavar="TOPIC", callback=_convert)
-streamed_argument = click.argument("topic", metavar="TOPIC", callback=_convert_streamed)
+topic_argument = click.argument(
+    "topic", metavar="TOPIC", callback=lambda context, parameter, name: topic_named(name)
+)
+streamed_argument = click.argument(
+    "topic", metavar="TOPIC", callback=lambda context, parameter, name: streamed_topic(name)
+)

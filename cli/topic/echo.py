@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import click
@@ -21,8 +21,7 @@ from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.process import Stop
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.base import Message
-from cogmap.schemas.render import field as field_at
-from cogmap.schemas.render import to_jsonable, to_text
+from cogmap.schemas.render import field, to_jsonable, to_text
 from cogmap.schemas.topics import Topic
 
 Format = Callable[[Message], str]
@@ -32,10 +31,21 @@ Format = Callable[[Message], str]
 @streamed_argument
 @click.option("--once", is_flag=True, help="End after one message.")
 @click.option("-n", "--times", type=click.IntRange(min=1), help="End after this many messages.")
-@click.option("--field", metavar="PATH", help="Only this part, such as objects.0.label.")
-@click.option("-f", "--full-length", is_flag=True, help="All values of every array.")
-@click.option("--csv", "as_csv", is_flag=True, help="One line a message, separated by commas.")
-@click.option("--no-arr", is_flag=True, help="Of arrays, only their type and shape.")
+@click.option(
+    "--field",
+    "fields",
+    multiple=True,
+    metavar="PATH",
+    help="Print only this part, such as objects.0.label; may be repeated.",
+)
+@click.option("-f", "--full-length", is_flag=True, help="Print all values of arrays.")
+@click.option(
+    "--csv",
+    "as_csv",
+    is_flag=True,
+    help="Print each message as one line of comma-separated values.",
+)
+@click.option("--no-arr", is_flag=True, help="Print only type and shape of arrays.")
 @json_option
 @connect_option
 @agent_option
@@ -43,7 +53,7 @@ def echo(
     topic: Topic,
     once: bool,
     times: int | None,
-    field: str | None,
+    fields: tuple[str, ...],
     full_length: bool,
     as_csv: bool,
     no_arr: bool,
@@ -56,10 +66,10 @@ def echo(
         raise UsageError("--csv and --json exclude each other: choose one")
 
     style = "csv" if as_csv else "json" if as_json else "text"
-    show = formatter(field, full_length, no_arr, style)
-    stop = Stop()
+    show = formatter(fields, full_length, no_arr, style)
     with observing(connect, agent, "topic-echo") as bus:
-        messages = _Messages(topic)
+        stop = Stop()
+        messages = ValidMessages(topic)
         bus.subscribe(topic, messages.inbox.put, messages.intake.count_lost)
         router = RouterWatch(bus.session, connect)
         limit = 1 if once else times
@@ -74,7 +84,7 @@ def echo(
         click.echo(messages.counts(), err=True)
 
 
-class _Messages:
+class ValidMessages:
     """The valid messages of `topic`, and counts of the others."""
 
     def __init__(self, topic: Topic) -> None:
@@ -94,7 +104,7 @@ class _Messages:
         return message
 
     def counts(self) -> str:
-        """How many were printed, and how many were not and why."""
+        """Count the messages that were printed, and those that were not, by reason."""
         rejected = self.intake.rejected[self._topic.name]
         lost = self.intake.gaps[self._topic.name]
         superseded = self.inbox.superseded[self._topic.name]
@@ -104,14 +114,25 @@ class _Messages:
         )
 
 
-def formatter(path: str | None, full: bool, no_arrays: bool, style: str) -> Format:
-    """A function that turns a message, or the part of it at `path`, into text, JSON or CSV.
+def formatter(paths: Sequence[str], full: bool, no_arrays: bool, style: str) -> Format:
+    """A function that turns a message into text, JSON or CSV.
 
-    It raises UsageError where the message has no such part.
+    With a path it turns the part there, with several the parts by their paths. It raises UsageError
+    if the message has no such part.
     """
 
+    def part_at(message: Message, path: str) -> Any:
+        try:
+            return field(message, path)
+        except LookupError as error:
+            raise UsageError(f"--field {path}: {error.args[0]}") from None
+
     def format_part(message: Message) -> str:
-        part = _part_of(message, path)
+        part: Any = message
+        if len(paths) == 1:
+            part = part_at(message, paths[0])
+        elif paths:
+            part = {path: part_at(message, path) for path in paths}
         if no_arrays:
             part = without_arrays(part)
 
@@ -123,15 +144,6 @@ def formatter(path: str | None, full: bool, no_arrays: bool, style: str) -> Form
         return f"{to_text(part, full)}\n---"
 
     return format_part
-
-
-def _part_of(message: Message, path: str | None) -> Any:
-    if path is None:
-        return message
-    try:
-        return field_at(message, path)
-    except LookupError as error:
-        raise UsageError(f"--field {path}: {error.args[0]}") from None
 
 
 def without_arrays(part: Any) -> Any:
@@ -151,18 +163,16 @@ def without_arrays(part: Any) -> Any:
 
 def comma_separated(part: Any) -> str:
     """All scalars in `part`, in order, as one line of CSV."""
+
+    def scalars(part: Any) -> Iterator[Any]:
+        if isinstance(part, dict):
+            part = list(part.values())
+        if not isinstance(part, list | tuple):
+            yield part
+            return
+        for item in part:
+            yield from scalars(item)
+
     line = io.StringIO()
-    csv.writer(line, lineterminator="").writerow(_leaves(part))
+    csv.writer(line, lineterminator="").writerow(scalars(part))
     return line.getvalue()
-
-
-def _leaves(part: Any) -> list[Any]:
-    if isinstance(part, dict):
-        part = list(part.values())
-    if not isinstance(part, list | tuple):
-        return [part]
-
-    leaves = []
-    for item in part:
-        leaves += _leaves(item)
-    return leaves

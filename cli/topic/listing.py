@@ -7,14 +7,14 @@ from typing import Any
 
 import click
 
-from cogmap.bus.discovery import Process, Role, System
+from cogmap.bus.discovery import Role, System
 from cogmap.cli.options import agent_option, connect_option, json_option
 from cogmap.cli.topic.argument import topic_argument
 from cogmap.cli.topic.observing import inspect_system
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Delivery, Topic
 
-_ROLES = {
+ROLES = {
     Role.PUBLISHES: ("Published topics:", "publisher"),
     Role.SUBSCRIBES: ("Subscribed topics:", "subscriber"),
     Role.ANSWERS: ("Answered topics:", "answerer"),
@@ -23,7 +23,7 @@ _ROLES = {
 
 @click.command("list")
 @click.option("-t", "--show-types", is_flag=True, help="Show each topic's type.")
-@click.option("-c", "--count-topics", is_flag=True, help="Only print how many there are.")
+@click.option("-c", "--count-topics", is_flag=True, help="Print only how many there are.")
 @click.option("-v", "--verbose", is_flag=True, help="Count publishers and subscribers.")
 @json_option
 @connect_option
@@ -36,14 +36,14 @@ def listing(
     used = system.topics()
 
     if as_json:
-        click.echo(json.dumps([_facts(system, topic) for topic in used]))
+        click.echo(json.dumps([facts(system, topic) for topic in used]))
     elif count_topics:
         click.echo(len(used))
     elif verbose:
-        click.echo("\n\n".join(_counts(system, role) for role in Role))
+        click.echo("\n\n".join(counts(system, role) for role in Role))
     else:
         for topic in used:
-            click.echo(_typed(topic) if show_types else topic.name)
+            click.echo(f"{topic.name} [{topic.type.__name__}]" if show_types else topic.name)
 
 
 @click.command()
@@ -56,18 +56,25 @@ def info(topic: Topic, verbose: bool, as_json: bool, connect: str, agent: str) -
     """Show a topic's type, its publishers and its subscribers."""
     system = inspect_system(connect, agent)
     if as_json:
-        click.echo(json.dumps(_facts(system, topic)))
+        click.echo(json.dumps(facts(system, topic)))
         return
 
     rate = f", {topic.rate_hz:g} Hz" if topic.rate_hz else ""
     click.echo(f"Type: {topic.type.__name__}")
     click.echo(f"Delivery: {topic.delivery.value}{rate}")
 
-    for title, role in _columns(topic):
+    roles = [("Publisher", Role.PUBLISHES), ("Subscription", Role.SUBSCRIBES)]
+    if topic.delivery is Delivery.ON_REQUEST:
+        roles = [("Answerer", Role.ANSWERS)]
+    for title, role in roles:
         found = system.doing(role, topic)
         click.echo(f"{title} count: {len(found)}")
-        if verbose:
-            click.echo("".join(_endpoint(process, role) for process in found), nl=False)
+        for process in found if verbose else ():
+            module = process.member.module if process.member else "unknown"
+            click.echo(
+                f"\nProcess name: {process.name}\nModule: {module}\n"
+                f"Endpoint type: {role.value.upper()}\nZenoh id: {process.zid}\n"
+            )
 
 
 @click.command("type")
@@ -80,52 +87,32 @@ def type_(topic: Topic) -> None:
 @click.command()
 @click.argument("type_name", metavar="TYPE")
 def find(type_name: str) -> None:
-    """List the topics that carry a type."""
+    """List the topics whose messages are of TYPE."""
     for topic in topics.ALL:
         if topic.type.__name__.lower() == type_name.lower():
             click.echo(topic.name)
 
 
-def _typed(topic: Topic) -> str:
-    return f"{topic.name} [{topic.type.__name__}]"
-
-
-def _counts(system: System, role: Role) -> str:
-    title, noun = _ROLES[role]
+def counts(system: System, role: Role) -> str:
+    """The topics for which processes have a role, and how many have it."""
+    title, noun = ROLES[role]
     lines = [title]
     for topic in system.topics():
         number = len(system.doing(role, topic))
         if number:
             plural = "s" if number > 1 else ""
-            lines.append(f" * {_typed(topic)} {number} {noun}{plural}")
+            lines.append(f" * {topic.name} [{topic.type.__name__}] {number} {noun}{plural}")
     return "\n".join(lines)
 
 
-def _columns(topic: Topic) -> list[tuple[str, Role]]:
-    if topic.delivery is Delivery.ON_REQUEST:
-        return [("Answerer", Role.ANSWERS)]
-    return [("Publisher", Role.PUBLISHES), ("Subscription", Role.SUBSCRIBES)]
-
-
-def _endpoint(process: Process, role: Role) -> str:
-    module = process.member.module if process.member else "unknown"
-    lines = [
-        "",
-        f"Process name: {process.name}",
-        f"Module: {module}",
-        f"Endpoint type: {role.value.upper()}",
-        f"Zenoh id: {process.zid}",
-    ]
-    return "\n".join(lines) + "\n\n"
-
-
-def _facts(system: System, topic: Topic) -> dict[str, Any]:
-    facts: dict[str, Any] = {
+def facts(system: System, topic: Topic) -> dict[str, Any]:
+    """A topic and who uses it, as programs read it."""
+    found: dict[str, Any] = {
         "topic": topic.name,
         "type": topic.type.__name__,
         "delivery": topic.delivery.value,
         "rate_hz": topic.rate_hz,
     }
     for role in Role:
-        facts[role.name.lower()] = [process.name for process in system.doing(role, topic)]
-    return facts
+        found[role.name.lower()] = [process.name for process in system.doing(role, topic)]
+    return found

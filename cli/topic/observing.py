@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -80,24 +78,18 @@ class RouterWatch:
 
 
 @contextmanager
-def observing(connect: str, agent: str, what: str) -> Iterator[ZenohBus]:
-    """A bus on which others see this process as `cli-what`. Raises NoRouterError.
-
-    The bus is closed in the end, also where the reader of the output has closed it.
-    """
+def observing(connect: str, agent: str, verb: str) -> Iterator[ZenohBus]:
+    """Open a bus on which others see this process as `cli-verb`. Raises NoRouterError."""
     bus = ZenohBus(connect, agent)
     try:
-        bus.identify(Member(CLI, f"{CLI}-{what}"))
+        bus.identify(Member(CLI, f"{CLI}-{verb}"))
         yield bus
-        sys.stdout.flush()
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     finally:
         bus.close()
 
 
 def inspect_system(connect: str, agent: str) -> System:
-    """What the processes of `agent` do at this moment. Raises NoRouterError."""
+    """Find the processes of `agent`, and the topics that they use. Raises NoRouterError."""
     session = open_client(connect)
     try:
         return discover(session, agent)

@@ -28,22 +28,25 @@ from cogmap.schemas.topics import Topic
     type=FiniteRange(min=0, min_open=True),
     default=1.0,
     show_default=True,
-    help="Hz.",
+    help="How often a second.",
 )
 @click.option("-1", "--once", is_flag=True, help="Publish once and end.")
-@click.option("-t", "--times", type=click.IntRange(min=1), help="Publish this often and end.")
+@click.option("-t", "--times", type=click.IntRange(min=1), help="Publish this many times and end.")
 @connect_option
 @agent_option
 def pub(
     topic: Topic, message: str, rate: float, once: bool, times: int | None, connect: str, agent: str
 ) -> None:
-    """Publish MESSAGE, written in JSON or YAML, until Ctrl-C."""
+    """Publish MESSAGE, written in JSON or YAML, again and again until Ctrl-C."""
     parsed = parse(topic, message)
-    _check(topic, parsed)
+    try:
+        decode(topic, encode(parsed))  # as a subscriber does, who rejects what is out of range
+    except MessageError as error:
+        raise UsageError(str(error)) from None
 
-    stop = Stop()
     limit = 1 if once else times
     with observing(connect, agent, "topic-pub") as bus:
+        stop = Stop()
         router = RouterWatch(bus.session, connect)
         publisher = Publisher(bus, topic, parsed)
         due_s = time.monotonic()
@@ -56,14 +59,6 @@ def pub(
             due_s += 1 / rate
             stop.wait(max(0.0, due_s - time.monotonic()))
             router.check()
-
-
-def _check(topic: Topic, message: Message) -> None:
-    """Raise UsageError where a subscriber would reject `message`."""
-    try:
-        decode(topic, encode(message))
-    except MessageError as error:
-        raise UsageError(str(error)) from None
 
 
 class Publisher:

@@ -1,4 +1,4 @@
-"""`cogmap topic hz`, `bw` and `delay`: metrics every second until Ctrl-C, and once more then."""
+"""`cogmap topic hz`, `bw` and `delay`: statistics every second until Ctrl-C, and once more then."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import click
 
 from cogmap.cli.options import agent_option, connect_option, json_option
 from cogmap.cli.topic.argument import streamed_argument
-from cogmap.cli.topic.metrics import BandwidthMetrics, DelayMetrics, Metrics, RateMetrics
-from cogmap.cli.topic.observing import TICK_S, Reception, Receptions, RouterWatch, observing
+from cogmap.cli.topic.observing import TICK_S, Receptions, RouterWatch, observing
+from cogmap.cli.topic.statistics import Bandwidth, Delay, Rate, Statistics
 from cogmap.runtime.process import Stop
 from cogmap.schemas.topics import Topic
 
@@ -21,24 +21,37 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def window_option(default: int) -> Callable[[F], F]:
-    """How many messages the metrics are over."""
+    """The option for how many messages the statistics are over."""
     return click.option(
         "-w",
         "--window",
         type=click.IntRange(min=2),
         default=default,
         show_default=True,
-        help="Over this many messages.",
+        help="Compute over this many last messages.",
     )
 
 
 def watch(
-    connect: str, agent: str, what: str, topic: Topic, metrics: Metrics, as_json: bool
+    connect: str, agent: str, verb: str, topic: Topic, statistics: Statistics, as_json: bool
 ) -> None:
-    """Print the metrics of `topic` every second until asked to stop, and once more then."""
-    stop = Stop()
-    report = _Report(topic, metrics, as_json)
-    with observing(connect, agent, f"topic-{what}") as bus:
+    """Print the statistics of `topic` every second until Ctrl-C, and once more then."""
+    messages = 0
+    printed_messages = 0
+
+    def report(final: bool) -> None:
+        if as_json:
+            facts = {"topic": topic.name, "messages": messages}
+            click.echo(json.dumps(facts | statistics.plain()))
+        elif 0 < messages < statistics.min_messages:
+            click.echo(f"one message of {topic.name}: two are needed")
+        else:
+            is_new = final or messages > printed_messages
+            text = statistics.text() if is_new else ""
+            click.echo(text or f"no new messages of {topic.name}")
+
+    with observing(connect, agent, f"topic-{verb}") as bus:
+        stop = Stop()
         receptions = Receptions(bus, topic)
         router = RouterWatch(bus.session, connect)
         due_s = time.monotonic() + REPORT_S
@@ -47,47 +60,16 @@ def watch(
             if reception is None:
                 router.check()
             else:
-                report.add(reception)
+                statistics.add(reception)
+                messages += 1
 
             now_s = time.monotonic()
             if now_s >= due_s:
-                report.print()
+                report(final=False)
+                printed_messages = messages
                 due_s = max(due_s + REPORT_S, now_s)
 
-        report.print(final=True)
-
-
-class _Report:
-    """Prints metrics, or that no message has arrived since it last printed."""
-
-    def __init__(self, topic: Topic, metrics: Metrics, as_json: bool) -> None:
-        self._topic = topic
-        self._metrics = metrics
-        self._as_json = as_json
-        self._messages = 0
-        self._printed_messages = 0
-
-    def add(self, reception: Reception) -> None:
-        """Count one message."""
-        self._metrics.add(reception)
-        self._messages += 1
-
-    def print(self, final: bool = False) -> None:
-        """Print the metrics so far; the final ones also where nothing is new."""
-        if self._as_json:
-            click.echo(self._json())
-        else:
-            click.echo(self._text(final))
-        self._printed_messages = self._messages
-
-    def _json(self) -> str:
-        facts = {"topic": self._topic.name, "messages": self._messages}
-        return json.dumps(facts | self._metrics.plain())
-
-    def _text(self, final: bool) -> str:
-        is_new = self._messages > self._printed_messages
-        text = self._metrics.text() if is_new or final else ""
-        return text or f"no new messages of {self._topic.name}"
+        report(final=True)
 
 
 @click.command()
@@ -98,7 +80,7 @@ class _Report:
 @agent_option
 def hz(topic: Topic, window: int, as_json: bool, connect: str, agent: str) -> None:
     """Measure how often messages arrive."""
-    watch(connect, agent, "hz", topic, RateMetrics(window), as_json)
+    watch(connect, agent, "hz", topic, Rate(window), as_json)
 
 
 @click.command()
@@ -108,8 +90,8 @@ def hz(topic: Topic, window: int, as_json: bool, connect: str, agent: str) -> No
 @connect_option
 @agent_option
 def bw(topic: Topic, window: int, as_json: bool, connect: str, agent: str) -> None:
-    """Measure how many bytes arrive in a second."""
-    watch(connect, agent, "bw", topic, BandwidthMetrics(window), as_json)
+    """Measure how many bytes a second arrive."""
+    watch(connect, agent, "bw", topic, Bandwidth(window), as_json)
 
 
 @click.command()
@@ -120,4 +102,4 @@ def bw(topic: Topic, window: int, as_json: bool, connect: str, agent: str) -> No
 @agent_option
 def delay(topic: Topic, window: int, as_json: bool, connect: str, agent: str) -> None:
     """Measure how old messages are, from the sensing to here, and where the time went."""
-    watch(connect, agent, "delay", topic, DelayMetrics(window), as_json)
+    watch(connect, agent, "delay", topic, Delay(window), as_json)

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import statistics
+from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Iterable
+from statistics import fmean
+from typing import Any
 
 import msgspec
 import numpy as np
 
 from cogmap.bus.codec import Stage
+from cogmap.cli.topic.observing import Reception
 
 MIN_SPAN_S = 1e-9
+"""Two messages may be received in the same nanosecond."""
 
 
 class Spread(msgspec.Struct, frozen=True):
@@ -24,9 +28,11 @@ class Spread(msgspec.Struct, frozen=True):
     window: int
 
     @classmethod
-    def of(cls, values: Iterable[float]) -> Spread:
-        """The spread of `values`, at least one."""
+    def of(cls, values: Iterable[float]) -> Spread | None:
+        """Return the spread of `values`, or None if there are none."""
         array = np.fromiter(values, np.float64)
+        if not array.size:
+            return None
         return cls(
             mean=float(array.mean()),
             least=float(array.min()),
@@ -36,84 +42,170 @@ class Spread(msgspec.Struct, frozen=True):
         )
 
 
-class Rate:
-    """The rate over the last `window` messages."""
+class Statistics(ABC):
+    """What one of the commands computes from the last `window` receptions."""
+
+    min_messages = 1
+
+    @abstractmethod
+    def add(self, reception: Reception) -> None:
+        """Count one message."""
+
+    @abstractmethod
+    def text(self) -> str:
+        """The statistics so far, as people read them; empty before `min_messages`."""
+
+    @abstractmethod
+    def plain(self) -> dict[str, Any]:
+        """The statistics so far, as programs read them."""
+
+
+class Rate(Statistics):
+    """How often messages arrive."""
+
+    min_messages = 2
 
     def __init__(self, window: int) -> None:
         self._times_ns: deque[int] = deque(maxlen=window + 1)
 
-    def add(self, at_ns: int) -> None:
-        """Count a message that arrived at `at_ns`."""
-        self._times_ns.append(at_ns)
+    def add(self, reception: Reception) -> None:
+        self._times_ns.append(reception.received_ns)
 
     def periods_s(self) -> Spread | None:
         """The times between messages; None before the second. The rate is one over their mean."""
-        times_ns = np.fromiter(self._times_ns, np.int64)
-        periods_s = np.diff(times_ns) / 1e9
-        return Spread.of(periods_s) if len(periods_s) else None
+        return Spread.of(np.diff(np.fromiter(self._times_ns, np.int64)) / 1e9)
+
+    def text(self) -> str:
+        period = self.periods_s()
+        if period is None:
+            return ""
+        return (
+            f"average rate: {1 / max(MIN_SPAN_S, period.mean):.3f}\n"
+            f"\tmin: {period.least:.3f}s max: {period.greatest:.3f}s "
+            f"std dev: {period.deviation:.5f}s window: {period.window + 1}"
+        )
+
+    def plain(self) -> dict[str, Any]:
+        period = self.periods_s()
+        rate_hz = 1 / max(MIN_SPAN_S, period.mean) if period else None
+        return {"rate_hz": rate_hz, "period_s": msgspec.to_builtins(period)}
 
 
-class Bandwidth:
-    """Bytes per second over the last `window` messages."""
+class Bandwidth(Statistics):
+    """How many bytes arrive in a second."""
+
+    min_messages = 2
 
     def __init__(self, window: int) -> None:
         self._arrivals: deque[tuple[int, int]] = deque(maxlen=window)
 
-    def add(self, at_ns: int, size_bytes: int) -> None:
-        """Count a message that arrived at `at_ns`."""
-        self._arrivals.append((at_ns, size_bytes))
+    def add(self, reception: Reception) -> None:
+        self._arrivals.append((reception.received_ns, reception.size_bytes))
 
-    def bytes_per_s(self, now_ns: int) -> float:
-        """The bytes in the window over the time since its first message."""
-        if not self._arrivals:
-            return 0.0
+    def bytes_per_s(self) -> float | None:
+        """The bytes after the first message of the window, over the time from it to the last; None
+        before the second.
+        """
+        if len(self._arrivals) < self.min_messages:
+            return None
 
-        total_bytes = sum(size for _, size in self._arrivals)
-        first_ns, _ = self._arrivals[0]
-        span_s = (now_ns - first_ns) / 1e9
-        return total_bytes / max(MIN_SPAN_S, span_s)
+        (first_ns, _), *later = self._arrivals
+        last_ns, _ = later[-1]
+        span_s = (last_ns - first_ns) / 1e9
+        return sum(size for _, size in later) / max(MIN_SPAN_S, span_s)
 
     def sizes_bytes(self) -> Spread | None:
         """The sizes of messages. None before the first one."""
-        if not self._arrivals:
-            return None
         return Spread.of(size for _, size in self._arrivals)
 
+    def text(self) -> str:
+        sizes = self.sizes_bytes()
+        bytes_per_s = self.bytes_per_s()
+        if sizes is None or bytes_per_s is None:
+            return ""
 
-class Delay:
-    """Ages of the last `window` messages on arrival, and where the time went."""
+        mean, least, greatest = map(in_bytes, (sizes.mean, sizes.least, sizes.greatest))
+        return (
+            f"{in_bytes(bytes_per_s)}/s from {sizes.window} messages\n"
+            f"\tMessage size mean: {mean} min: {least} max: {greatest}"
+        )
+
+    def plain(self) -> dict[str, Any]:
+        sizes = msgspec.to_builtins(self.sizes_bytes())
+        return {"bytes_per_s": self.bytes_per_s(), "size_bytes": sizes}
+
+
+class Delay(Statistics):
+    """How old messages are when they arrive, and where the time went."""
 
     def __init__(self, window: int) -> None:
         self._ages_s: deque[float] = deque(maxlen=window)
         self._last_leg_s: deque[float] = deque(maxlen=window)
         self._stages: deque[list[Stage]] = deque(maxlen=window)
 
-    def add(self, born_ns: int, sent_ns: int, received_ns: int, stages: list[Stage]) -> None:
-        """Count a message that derives from the sensing at `born_ns`."""
-        self._ages_s.append((received_ns - born_ns) / 1e9)
-        self._last_leg_s.append((received_ns - sent_ns) / 1e9)
-        self._stages.append(stages)
+    def add(self, reception: Reception) -> None:
+        envelope = reception.envelope
+        if envelope is not None:
+            self._ages_s.append((reception.received_ns - envelope.born_ns) / 1e9)
+            self._last_leg_s.append((reception.received_ns - envelope.sent_ns) / 1e9)
+            self._stages.append(envelope.stages)
 
     def ages_s(self) -> Spread | None:
-        """From the sensing to here. None before the first message."""
-        return Spread.of(self._ages_s) if self._ages_s else None
+        """The times from the sensing to here. None before the first message."""
+        return Spread.of(self._ages_s)
 
     def last_leg_s(self) -> Spread | None:
-        """From the last publisher to here. None before the first message."""
-        return Spread.of(self._last_leg_s) if self._last_leg_s else None
+        """The times from the last publisher to here. None before the first message."""
+        return Spread.of(self._last_leg_s)
 
     def stages_s(self) -> dict[str, tuple[float, float]]:
         """For each module passed, mean times of computing and of encoding, transport and queues."""
-        computing_ns: dict[str, list[int]] = {}
-        resting_ns: dict[str, list[int]] = {}
+        times_s: dict[str, list[tuple[float, float]]] = {}
         for stages in self._stages:
             for module, compute_ns, rest_ns in stages:
-                computing_ns.setdefault(module, []).append(compute_ns)
-                resting_ns.setdefault(module, []).append(rest_ns)
+                times_s.setdefault(module, []).append((compute_ns / 1e9, rest_ns / 1e9))
 
         means = {}
-        for module, computed_ns in computing_ns.items():
-            compute_s = statistics.fmean(computed_ns) / 1e9
-            rest_s = statistics.fmean(resting_ns[module]) / 1e9
-            means[module] = (compute_s, rest_s)
+        for module, of_module in times_s.items():
+            compute_s, rest_s = zip(*of_module, strict=True)
+            means[module] = (fmean(compute_s), fmean(rest_s))
         return means
+
+    def text(self) -> str:
+        age = self.ages_s()
+        last_leg = self.last_leg_s()
+        if age is None or last_leg is None:
+            return ""
+
+        lines = [
+            f"average delay: {age.mean:.5f}",
+            f"\tmin: {age.least:.5f}s max: {age.greatest:.5f}s "
+            f"std dev: {age.deviation:.5f}s window: {age.window}",
+        ]
+        for module, (compute_s, rest_s) in self.stages_s().items():
+            lines.append(f"\t{module}: {compute_s:.5f}s computing, {rest_s:.5f}s in transport")
+        lines.append(f"\tfrom its last publisher: {last_leg.mean:.5f}s")
+        return "\n".join(lines)
+
+    def plain(self) -> dict[str, Any]:
+        stages = {
+            module: {"compute_s": compute_s, "rest_s": rest_s}
+            for module, (compute_s, rest_s) in self.stages_s().items()
+        }
+        return {
+            "delay_s": msgspec.to_builtins(self.ages_s()),
+            "last_leg_s": msgspec.to_builtins(self.last_leg_s()),
+            "stages": stages,
+        }
+
+
+def in_bytes(size: float) -> str:
+    """`size` bytes with the unit that leaves at most three digits before the point."""
+    if abs(size) < 1000:
+        return f"{size:.0f} B"
+
+    for unit in ("KB", "MB"):
+        size /= 1000
+        if abs(size) < 1000:
+            return f"{size:.2f} {unit}"
+    return f"{size / 1000:.2f} GB"

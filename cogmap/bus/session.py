@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import re
 import socket
+import time
 from typing import TYPE_CHECKING
 
 import zenoh
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_AGENT = "agent"
 CONNECT_TIMEOUT_S = 5.0
+RETRY_S = 0.05
 MAX_PORT = 65535
 # How long a full link delays the others before it drops a message, which the publisher's cache
 # restores later. Having dropped one, it drops the next at once until it has room: a subscriber that
@@ -52,11 +54,14 @@ def free_endpoint() -> str:
 
 
 def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Session:
-    """A session with the router at `endpoint`. Raises NoRouterError if none answers in time."""
-    _address(endpoint)
+    """A session with the router at `endpoint`. Raises NoRouterError if none answers in time.
+
+    Until something listens there, Ctrl-C ends the wait at once.
+    """
+    left_s = _await_listener(endpoint, timeout_s)
     settings = {
         "connect/endpoints": [endpoint],
-        "connect/timeout_ms": int(timeout_s * 1000),
+        "connect/timeout_ms": int(left_s * 1000),
         "connect/exit_on_failure": True,
         "connect/retry": {
             "period_init_ms": 50,
@@ -71,6 +76,22 @@ def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Se
             f"no router at {endpoint} within {timeout_s:g} s: start one with `cogmap run` or "
             f"`cogmap router`, or name its endpoint with --connect"
         ) from None
+
+
+def _await_listener(endpoint: str, timeout_s: float) -> float:
+    """Wait until something listens at `endpoint`, at most `timeout_s`. Returns the time left.
+
+    Zenoh would wait with Python's signals unanswered.
+    """
+    address = _address(endpoint)
+    until_s = time.monotonic() + timeout_s
+    while (left_s := until_s - time.monotonic()) > RETRY_S:
+        try:
+            socket.create_connection(address, left_s).close()
+            break
+        except OSError:
+            time.sleep(RETRY_S)
+    return max(RETRY_S, left_s)
 
 
 def open_router(endpoint: str) -> zenoh.Session:

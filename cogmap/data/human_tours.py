@@ -1,5 +1,4 @@
-"""Tours that people drew of problems: GraphN.lib, as TSPLIB writes them, and tours.csv, plain or
-packed by xz.
+"""Tours that people drew of problems: GraphN.lib, as TSPLIB writes them, and tours.csv.
 
 A row of it is a tour: the number of its graph, of its participant, and x and y of the nodes in the
 order of the visit. Other columns are ignored.
@@ -8,22 +7,21 @@ order of the visit. Other columns are ignored.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Mapping
+from collections import defaultdict
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.lines import wrong_line
-from cogmap.data.pose_graph import numbered_lines
+from cogmap.data.text import Line, numbered_lines, plain_or_packed
 from cogmap.data.tsplib import Problem, read
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Indices
 
-TOURS = ("tours.csv", "tours.csv.xz")
+TOURS = "tours.csv"
 COLUMNS = ("graph", "participant", "x", "y")
 _GRAPHS = "Graph*.lib"
-Nodes = dict[tuple[float, float], int]
 
 
 class HumanTours(NamedTuple):
@@ -34,86 +32,56 @@ class HumanTours(NamedTuple):
 
 
 def read_folder(folder: Path) -> list[HumanTours]:
-    """Every problem of a folder that somebody drew a tour of, by its name.
+    """Read every problem of a folder that somebody drew a tour of, by its name.
 
-    Raises UsageError naming file and line where a row is no tour of its problem.
+    Raises UsageError naming file and line of a row that is no tour of its problem.
     """
     graphs = sorted(folder.glob(_GRAPHS))
     if not graphs:
         raise UsageError(f"{folder} has no {_GRAPHS}: give a folder of problems and people's tours")
+    path = plain_or_packed(folder, TOURS)
+    if path is None:
+        raise UsageError(f"{folder} has no {TOURS}, plain or packed: put people's tours there")
 
-    problems = [read(path) for path in graphs]
+    problems = [read(graph) for graph in graphs]
     by_number = {problem.name.removeprefix("Graph"): problem for problem in problems}
-    tours = _tours(_tours_file(folder), by_number)
+    tours: dict[str, list[Indices]] = defaultdict(list)
 
-    found = []
-    for problem in problems:
-        if tours[problem.name]:
-            found.append(HumanTours(problem, tours[problem.name]))
-    return found
-
-
-def _tours_file(folder: Path) -> Path:
-    for name in TOURS:
-        path = folder / name
-        if path.exists():
-            return path
-    raise UsageError(f"{folder} has no {' or '.join(TOURS)}: put people's tours there")
-
-
-def _tours(path: Path, problems: Mapping[str, Problem]) -> dict[str, list[Indices]]:
-    """The tours of a file, by the name of their problem."""
-    nodes = {number: _nodes(problem) for number, problem in problems.items()}
-    tours: dict[str, list[Indices]] = {problem.name: [] for problem in problems.values()}
-
-    for number, line, row in _rows(path):
-        graph = row.get("graph", "")
-        if graph not in problems:
-            raise wrong_line(path, number, line, f"a graph of the folder: {', '.join(problems)}")
-
-        tour = _tour(row, nodes[graph])
-        if tour is None:
-            raise wrong_line(path, number, line, f"a tour past every node of graph {graph}, once")
-        tours[problems[graph].name].append(tour)
-
-    return tours
-
-
-def _rows(path: Path) -> Iterator[tuple[int, str, Mapping[str, str]]]:
-    """Each line after the first, its number, and its values by column."""
-    lines = numbered_lines(path)
-    number, header = next(lines, (1, ""))
+    lines = numbered_lines(path, "people's tours as CSV")
+    header = next(lines, Line(path, 1, ""))
     names = _values(header)
     if not set(COLUMNS) <= set(names):
-        raise wrong_line(path, number, header, f"the columns {', '.join(COLUMNS)}")
+        raise header.wrong(f"the columns {', '.join(COLUMNS)}")
 
-    for number, line in lines:
-        values = _values(line)
-        row = zip(names, values, strict=False)
-        yield number, line, dict(row)
+    for line in lines:
+        row = dict(zip(names, _values(line), strict=False))
+        graph = row.get("graph", "")
+        if graph not in by_number:
+            raise line.wrong(f"a graph of the folder: {', '.join(by_number)}")
+
+        tour = _tour(row, by_number[graph])
+        if tour is None:
+            raise line.wrong(f"a tour past every node of graph {graph}, once")
+        tours[graph].append(tour)
+
+    return [HumanTours(by_number[number], tours[number]) for number in by_number if tours[number]]
 
 
-def _values(line: str) -> list[str]:
-    return next(csv.reader([line]), [])
+def _values(line: Line) -> list[str]:
+    return next(csv.reader([line.text]), [])
 
 
-def _nodes(problem: Problem) -> Nodes:
-    """The number of each node, counted from 0, by its position."""
-    nodes: Nodes = {}
+def _tour(row: Mapping[str, str], problem: Problem) -> Indices | None:
+    """Return the nodes in the order of a row; None if it does not visit each once."""
+    nodes_at: dict[tuple[float, float], list[int]] = defaultdict(list)
     for node, (x, y) in enumerate(problem.positions.tolist()):
-        nodes[x, y] = node
-    return nodes
+        nodes_at[x, y].append(node)
 
-
-def _tour(row: Mapping[str, str], nodes: Nodes) -> Indices | None:
-    """The nodes in the order of a row; None where it does not visit each once."""
     try:
-        x = [float(word) for word in row["x"].split(",")]
-        y = [float(word) for word in row["y"].split(",")]
-        visited = [nodes[position] for position in zip(x, y, strict=True)]
-    except (KeyError, ValueError):
+        x_values = map(float, row["x"].split(","))
+        y_values = map(float, row["y"].split(","))
+        # Of nodes at one place, which one was meant makes no difference.
+        visited = [nodes_at[place].pop(0) for place in zip(x_values, y_values, strict=True)]
+    except (KeyError, ValueError, IndexError):
         return None
-
-    if sorted(visited) != sorted(nodes.values()):
-        return None
-    return np.array(visited, np.int64)
+    return np.array(visited, np.int64) if len(visited) == len(problem) else None

@@ -1,4 +1,4 @@
-"""Grid maps and route problems in the MovingAI format, plain or packed by gzip, bzip2 or xz.
+"""Grid maps and route problems in the MovingAI format.
 
 Sturtevant (2012), doi 10.1109/TCIAIG.2012.2197681. A cell (x, y) is column x of row y, as in the
 files. Lengths are octile: 1 to a neighbour beside, the square root of 2 to one across, and no
@@ -14,14 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.lines import wrong_line
-from cogmap.data.packed import lines
+from cogmap.data.text import Line, numbered_lines
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Booleans
 
 PASSABLE = frozenset(".GS")
 KNOWN = PASSABLE | frozenset("@OTW")
-HEADER = ("type octile", "height and a number", "width and a number", "map")
+HEADER = {"type": "type octile", "height": "height and a number", "width": "width and a number"}
+VERSIONS = (["version", "1"], ["version", "1.0"])
 MAX_CELLS = 1 << 28
 _FIELDS = 9
 _MAP = "a grid map in the MovingAI format (.map)"
@@ -37,104 +37,92 @@ class Problem(NamedTuple):
 
 
 def read_map(path: Path) -> Booleans:
-    """(width, height): which cells of the map in a file can be passed.
+    """Read a map, (width, height): which of its cells can be passed.
 
-    Raises UsageError naming the file and the line that is wrong.
+    Raises UsageError naming file, line and remedy.
     """
-    numbered = _numbered(path, _MAP)
-    width, height = _size(path, numbered)
-
+    lines = numbered_lines(path, _MAP)
+    width, height = _size(path, lines)
     is_passable = np.zeros((width, height), bool)
-    for y in range(height):
-        number, line = _next(path, numbered, f"row {y + 1} of {height}")
-        if len(line) != width or not KNOWN.issuperset(line):
-            raise wrong_line(path, number, line, f"{width} cells out of . G S @ O T W")
+    rows = 0
 
-        is_passable[:, y] = [cell in PASSABLE for cell in line]
+    for line in lines:
+        cells = line.text.rstrip()
+        if rows == height:
+            if cells:
+                raise line.wrong(f"the end after {height} rows", "make height their number")
+            continue
+        if len(cells) != width or not KNOWN.issuperset(cells):
+            raise line.wrong(f"{width} cells out of . G S @ O T W", "mend the row, or width")
 
+        is_passable[:, rows] = [cell in PASSABLE for cell in cells]
+        rows += 1
+
+    if rows < height:
+        raise UsageError(f"{path} ends before row {rows + 1} of {height}: give all of it")
     return is_passable
 
 
-def read_problems(path: Path, is_passable: Booleans) -> list[Problem]:
-    """The problems in a file, for the map `is_passable` (width, height).
+def _size(path: Path, lines: Iterator[Line]) -> tuple[int, int]:
+    """Read the header of a map, up to the line `map`, for its width and height."""
+    sizes: dict[str, int] = {}
+    for line in lines:
+        words = line.text.split()
+        if words == ["map"]:
+            break
 
-    Raises UsageError naming the file and the line that is wrong.
-    """
-    numbered = _numbered(path, _SCENARIO)
-    number, line = _next(path, numbered, "version 1")
-    if line.split() not in (["version", "1"], ["version", "1.0"]):
-        raise wrong_line(path, number, line, "version 1")
+        key, value = words if len(words) == 2 else ("", "")
+        if key in ("width", "height") and value.isdecimal():
+            sizes[key] = int(value)
+        elif words != ["type", "octile"]:
+            raise line.wrong(HEADER.get(key, f"{', '.join(HEADER.values())}, or map"))
 
-    problems = []
-    for number, line in numbered:
-        if line.strip():
-            problems.append(_problem(path, number, line, is_passable))
-    if not problems:
-        raise UsageError(f"{path} has no problem: give {_SCENARIO}")
-
-    return problems
-
-
-def _problem(path: Path, number: int, line: str, is_passable: Booleans) -> Problem:
-    # The second field is a map's name, which may have spaces.
-    fields = line.rsplit(maxsplit=_FIELDS - 2)
-    try:
-        width, height, start_x, start_y, goal_x, goal_y = map(int, fields[1:-1])
-        optimal = float(fields[-1])
-    except (ValueError, IndexError):
-        expected = "bucket, map, width, height, start x y, goal x y and the optimal length"
-        raise wrong_line(path, number, line, expected) from None
-
-    if (width, height) != is_passable.shape:
-        map_width, map_height = is_passable.shape
-        expected = f"a problem for a map of {map_width} x {map_height} cells"
-        raise wrong_line(path, number, line, expected)
-    if not math.isfinite(optimal) or optimal < 0:
-        raise wrong_line(path, number, line, "an optimal length that is finite and not below 0")
-
-    problem = Problem((start_x, start_y), (goal_x, goal_y), optimal)
-    for x, y in (problem.start, problem.goal):
-        if not _can_pass(is_passable, x, y):
-            raise wrong_line(path, number, line, f"({x}, {y}) to be a passable cell of the map")
-
-    return problem
-
-
-def _can_pass(is_passable: Booleans, x: int, y: int) -> bool:
-    """Whether a cell lies on the map and can be passed."""
-    width, height = is_passable.shape
-    is_inside = 0 <= x < width and 0 <= y < height
-    return is_inside and bool(is_passable[x, y])
-
-
-def _size(path: Path, numbered: Iterator[tuple[int, str]]) -> tuple[int, int]:
-    """The width and height that the header of a map states."""
-    sizes = {}
-    for expected in HEADER:
-        number, line = _next(path, numbered, expected)
-        words = line.split()
-        key = expected.split()[0]
-        if key in ("height", "width"):
-            if len(words) != 2 or words[0] != key or not words[1].isdecimal():
-                raise wrong_line(path, number, line, expected)
-            sizes[key] = int(words[1])
-        elif words != expected.split():
-            raise wrong_line(path, number, line, expected)
-
-    width = sizes["width"]
-    height = sizes["height"]
+    if len(sizes) < 2:
+        raise UsageError(f"{path} has no height or no width before its map: give {_MAP}")
+    width, height = sizes["width"], sizes["height"]
     if not 0 < width * height <= MAX_CELLS:
         raise UsageError(f"{path} has {width} x {height} cells: give a map of 1 to {MAX_CELLS}")
     return width, height
 
 
-def _numbered(path: Path, give: str) -> Iterator[tuple[int, str]]:
-    for number, line in enumerate(lines(path, give), start=1):
-        yield number, line.decode("latin-1").rstrip("\r\n")
+def read_problems(path: Path, is_passable: Booleans) -> list[Problem]:
+    """Read the problems in a file, for the map `is_passable` (width, height).
+
+    Raises UsageError naming file, line and remedy.
+    """
+    lines = numbered_lines(path, _SCENARIO)
+    first = next(lines, Line(path, 1, ""))
+    if first.text.split() not in VERSIONS:
+        raise first.wrong("version 1", f"give {_SCENARIO}")
+
+    problems = [_problem(line, is_passable) for line in lines if line.text.strip()]
+    if not problems:
+        raise UsageError(f"{path} has no problem: give {_SCENARIO}")
+    return problems
 
 
-def _next(path: Path, numbered: Iterator[tuple[int, str]], expected: str) -> tuple[int, str]:
+def _problem(line: Line, is_passable: Booleans) -> Problem:
+    # The second field is a map's name, which may have spaces.
+    fields = line.text.rsplit(maxsplit=_FIELDS - 2)
     try:
-        return next(numbered)
-    except StopIteration:
-        raise UsageError(f"{path} ends where it should have {expected}: give all of it") from None
+        width, height, start_x, start_y, goal_x, goal_y = map(int, fields[1:-1])
+        optimal = float(fields[-1])
+    except (ValueError, IndexError):
+        expected = "bucket, map, width, height, start x y, goal x y and the optimal length"
+        raise line.wrong(expected) from None
+
+    map_width, map_height = is_passable.shape
+    if (width, height) != (map_width, map_height):
+        expected = f"a problem for a map of {map_width} x {map_height} cells"
+        raise line.wrong(expected, "give the map of these problems")
+    if not math.isfinite(optimal) or optimal < 0:
+        raise line.wrong("an optimal length that is finite and not below 0")
+
+    problem = Problem((start_x, start_y), (goal_x, goal_y), optimal)
+    for x, y in (problem.start, problem.goal):
+        is_inside = 0 <= x < width and 0 <= y < height
+        if not is_inside or not is_passable[x, y]:
+            expected = f"({x}, {y}) to be a passable cell of the map"
+            raise line.wrong(expected, "remove the problem, or give the map that it is of")
+
+    return problem

@@ -2,25 +2,25 @@
 barcodes.
 
 Leung, Halpern, Barfoot and Liu (2011), doi 10.1177/0278364911398404. Files are whitespace-separated
-numbers with `#` comments, as published, or packed with xz (`.dat.xz`).
+numbers with `#` comments, as published, or packed.
 """
 
 from __future__ import annotations
 
 import io
-import lzma
-import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.lines import wrong_line
+from cogmap.data.text import numbered_lines, plain_or_packed, read_bytes
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats
 
 ROBOTS = range(1, 6)
-_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
+GIVE = "the file of an MRCLAM set"
 
 
 @dataclass(frozen=True)
@@ -56,8 +56,7 @@ class Recording:
     landmarks: dict[int, tuple[float, float]]
 
 
-@dataclass(frozen=True)
-class _Columns:
+class _Columns(NamedTuple):
     """What a line of a file holds: how many numbers, and which of them must be above 0, if any."""
 
     number: int
@@ -65,23 +64,10 @@ class _Columns:
     positive: int | None = None
 
     def fit(self, rows: Floats) -> bool:
-        """Whether an array (n, columns) holds such numbers."""
-        if rows.shape[1:] != (self.number,):
+        """Return if (n, columns) rows are such numbers."""
+        if rows.shape[1] != self.number or not np.isfinite(rows).all():
             return False
-        if not np.isfinite(rows).all():
-            return False
-        if self.positive is None:
-            return True
-        positive = rows[:, self.positive]
-        return bool((positive > 0).all())
-
-    def fit_words(self, words: list[str]) -> bool:
-        """Whether the words of a line are such numbers."""
-        for word in words:
-            if not _NUMBER.fullmatch(word):
-                return False
-        values = [float(word) for word in words]
-        return self.fit(np.array([values]))
+        return self.positive is None or bool((rows[:, self.positive] > 0).all())
 
 
 _BARCODES = _Columns(2, "a subject and its barcode")
@@ -105,7 +91,7 @@ def read(folder: Path) -> Recording:
     for subject, x_m, y_m, *_ in _table(folder, "Landmark_Groundtruth", _LANDMARKS).tolist():
         landmarks[int(subject)] = (x_m, y_m)
 
-    numbers = [n for n in ROBOTS if _path(folder, f"Robot{n}_Odometry") is not None]
+    numbers = [n for n in ROBOTS if plain_or_packed(folder, f"Robot{n}_Odometry.dat")]
     if not numbers:
         raise UsageError(f"{folder} has no Robot1_Odometry.dat: give the folder of an MRCLAM set")
 
@@ -137,49 +123,29 @@ def _by_time(rows: Floats) -> Floats:
     return rows[order]
 
 
-def _path(folder: Path, name: str) -> Path | None:
-    for path in (folder / f"{name}.dat", folder / f"{name}.dat.xz"):
-        if path.is_file():
-            return path
-    return None
-
-
 def _table(folder: Path, name: str, columns: _Columns) -> Floats:
-    """The numbers in a file, (n, columns). Raises UsageError."""
-    path = _path(folder, name)
+    """Read the numbers in a file, (n, columns). Raises UsageError."""
+    path = plain_or_packed(folder, f"{name}.dat")
     if path is None:
         raise UsageError(
             f"{folder} has no {name}.dat: give the folder of an MRCLAM set, with every file in it"
         )
 
-    text = _text(path)
-    contents = [line.partition("#")[0].split() for line in text.splitlines()]
-    if not any(contents):
-        raise UsageError(f"{path} has no line with {columns.expected}")
+    rows = _parsed(read_bytes(path, GIVE).decode("utf-8", "replace"))
+    if not len(rows):
+        raise UsageError(f"{path} has no line with {columns.expected}: give the whole file")
+    if not columns.fit(rows):
+        for line in numbered_lines(path, GIVE):
+            content, _, _ = line.text.partition("#")
+            if content.strip() and not columns.fit(_parsed(content)):
+                raise line.wrong(columns.expected)
+    return rows
+
+
+def _parsed(text: str) -> Floats:
+    """Parse lines of numbers, (n, columns); an array of no columns if they are none."""
     try:
-        rows: Floats = np.loadtxt(io.StringIO(text), comments="#", ndmin=2)
+        with warnings.catch_warnings(action="ignore"):  # that there is no line, which is checked
+            return np.loadtxt(io.StringIO(text), comments="#", ndmin=2)
     except ValueError:
-        rows = np.empty((0, 0))
-    if columns.fit(rows):
-        return rows
-    raise _first_wrong(path, text.splitlines(), contents, columns)
-
-
-def _first_wrong(
-    path: Path, lines: list[str], contents: list[list[str]], columns: _Columns
-) -> UsageError:
-    """The error that names the first line whose content does not fit."""
-    for number, (line, words) in enumerate(zip(lines, contents, strict=True), 1):
-        if words and not columns.fit_words(words):
-            return wrong_line(path, number, line, columns.expected)
-    return UsageError(f"{path} has lines that are not {columns.expected}")
-
-
-def _text(path: Path) -> str:
-    try:
-        raw = path.read_bytes()
-        if path.suffix == ".xz":
-            raw = lzma.decompress(raw)
-        return raw.decode()
-    except (OSError, lzma.LZMAError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path} cannot be read: {error}") from None
+        return np.empty((1, 0))

@@ -1,29 +1,33 @@
 """OpenStreetMap extracts, read by libosmium: XML as JOSM, Overpass and the API write it, plain or
-packed by gzip, bzip2 or xz, and PBF as Geofabrik distributes it.
+packed, and PBF as Geofabrik distributes it.
 """
 
 from __future__ import annotations
 
-import lzma
 from dataclasses import dataclass, field
+from io import BytesIO
+from itertools import groupby
 from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
 
+import numpy as np
 import osmium
 from osmium.osm import Node, Relation
 from osmium.osm import Way as ReadWay
 
+from cogmap.data.text import PACKED, read_bytes
 from cogmap.errors import UsageError
+from cogmap.geometry.geographic import continuous
 
-SUFFIXES = (".osm", ".osm.gz", ".osm.xz", ".osm.bz2", ".osm.pbf")
-_REMEDY = "give an OpenStreetMap extract, as XML (plain or packed) or as PBF"
-_LIBRARY_ERRORS = (
-    osmium.InvalidLocationError,
-    RuntimeError,
-    ValueError,
-    OSError,
-    EOFError,
-    lzma.LZMAError,
-)
+SUFFIXES = (*(f".osm{packed}" for packed in PACKED), ".osm.pbf")
+GIVE = "an OpenStreetMap extract, as PBF or as XML (of Overpass by `(._;>;); out;`)"
+# Contents that downloads are mistaken for, by how they begin, and what to do about them.
+_FOREIGN = {
+    b"{": "it is JSON, ask Overpass for [out:xml]",
+    b"<html": "it is a web page such as a server's error, download the extract again",
+    b"<!doctype html": "it is a web page such as a server's error, download the extract again",
+}
 Tags = dict[str, str]
 
 
@@ -43,64 +47,137 @@ class Extract:
     """The contents of a file: nodes as (longitude, latitude) in degrees by id, the tags of those
     that have any, and ways.
 
-    A way may name nodes that lie outside the extract; a multipolygon that is not whole is left out.
+    Longitudes are beyond 180 east of the 180th meridian if the extract lies on both sides. A way
+    may name nodes that lie outside the extract; a multipolygon that is not whole is left out.
     """
 
     nodes: dict[int, tuple[float, float]] = field(default_factory=dict)
     node_tags: dict[int, Tags] = field(default_factory=dict)
     ways: list[Way] = field(default_factory=list)
 
+    def pieces(self, way: Way) -> list[list[int]]:
+        """Return the parts of a way that lie in the extract, each as two nodes at least."""
+        runs = groupby(way.nodes, key=self.nodes.__contains__)
+        parts = [list(nodes) for is_inside, nodes in runs if is_inside]
+        return [part for part in parts if len(part) > 1]
+
 
 def read(path: Path) -> Extract:
-    """The extract in a file. Raises UsageError naming the file and the element that is wrong, or
-    the line where its XML is.
+    """Read the extract in a file: of each element the newest version, once, unless it is deleted.
+
+    Raises UsageError naming the file and the element that is wrong, or the line if its XML is, and
+    for a download that is not whole.
     """
-    extract = Extract()
-    buildings = []
+    content = b""
+    source: str | osmium.io.FileBuffer = str(path)
+    if path.suffix != ".pbf":
+        content = read_bytes(path, GIVE)
+        source = osmium.io.FileBuffer(content, "osm")
+
+    found = _Elements(path)
     try:
-        for element in osmium.FileProcessor(_source(path)):
-            if isinstance(element, Node):
-                _add_node(extract, path, element)
-            elif isinstance(element, ReadWay):
-                _add_way(extract, path, element)
-            elif isinstance(element, Relation) and _is_building(element):
-                buildings.append(_outlined(element))
-    except _LIBRARY_ERRORS as error:
-        raise UsageError(f"{path} cannot be read ({error}): {_REMEDY}") from None
-
-    way_of = {way.id: way for way in extract.ways}
-    for building in buildings:
-        extract.ways.extend(_rings(building, way_of))
-    return extract
-
-
-def _source(path: Path) -> str | osmium.io.FileBuffer:
-    """What libosmium reads: the file, or its content where that is packed as it does not know."""
-    if path.suffix != ".xz":
-        return str(path)
-    content = lzma.decompress(path.read_bytes())
-    return osmium.io.FileBuffer(content, "osm")
-
-
-def _add_node(extract: Extract, path: Path, node: Node) -> None:
-    if not node.location.valid():
+        for element in osmium.FileProcessor(source):
+            if isinstance(element, Node | ReadWay | Relation):
+                found.enter(element)
+    except (osmium.InvalidLocationError, RuntimeError, ValueError, OSError) as error:
+        beginning = content[:100].lstrip().lower()
+        remedies = [remedy for start, remedy in _FOREIGN.items() if beginning.startswith(start)]
         raise UsageError(
-            f"{path}, node {node.id}: expected lon in degrees from -180 to 180 and lat from -90 "
-            "to 90"
-        )
-    extract.nodes[node.id] = (node.lon, node.lat)
-    tags = dict(node.tags)
-    if tags:
-        extract.node_tags[node.id] = tags
+            f"{path} cannot be read ({error}): {(*remedies, f'give {GIVE}')[0]}"
+        ) from None
+
+    _remove_deleted(found, content)
+    if found.ways and not found.nodes:
+        raise UsageError(f"{path} has ways, but no positions of their nodes: give {GIVE}")
+
+    if found.nodes:
+        lonlat = continuous(np.array(list(found.nodes.values())))
+        found.nodes = dict(zip(found.nodes, map(tuple, lonlat.tolist()), strict=True))
+    rings = [ring for building in found.buildings.values() for ring in _rings(building, found.ways)]
+    return Extract(found.nodes, found.node_tags, [*found.ways.values(), *rings])
 
 
-def _add_way(extract: Extract, path: Path, way: ReadWay) -> None:
-    nodes = [node.ref for node in way.nodes]
-    if 0 in nodes:
-        raise UsageError(f"{path}, way {way.id}: expected a node's id in each <nd>, as ref")
+class _Elements:
+    """The elements of a file by their ids, each in the newest version that has been read."""
 
-    tags = dict(way.tags)
-    extract.ways.append(Way(way.id, nodes, tags))
+    def __init__(self, path: Path) -> None:
+        self.nodes: dict[int, tuple[float, float]] = {}
+        self.node_tags: dict[int, Tags] = {}
+        self.ways: dict[int, Way] = {}
+        self.buildings: dict[int, _Multipolygon] = {}
+        self.path = path
+        self._versions: dict[str, dict[int, int]] = {"n": {}, "w": {}, "r": {}}
+
+    def enter(self, element: Node | ReadWay | Relation) -> None:
+        """Enter an element in the place of an older version. Raises UsageError if it is wrong."""
+        kind = element.type_str()
+        versions = self._versions[kind]
+        if element.version < versions.get(element.id, 0):
+            return
+        versions[element.id] = element.version
+        if element.deleted:
+            self.remove(kind, element.id)
+        elif isinstance(element, Node):
+            self._enter_node(element)
+        elif isinstance(element, ReadWay):
+            self._enter_way(element)
+        elif element.tags.get("type") == "multipolygon" and "building" in element.tags:
+            members = [each for each in element.members if each.type == "w"]
+            outer = [each.ref for each in members if each.role != "inner"]
+            self.buildings[element.id] = _Multipolygon(element.id, outer, dict(element.tags))
+
+    def remove(self, kind: str, identifier: int) -> None:
+        """Remove an element that was deleted."""
+        of_kind: dict[str, tuple[dict[int, Any], ...]] = {
+            "n": (self.nodes, self.node_tags),
+            "w": (self.ways,),
+            "r": (self.buildings,),
+        }
+        for elements in of_kind[kind]:
+            elements.pop(identifier, None)
+
+    def _enter_node(self, node: Node) -> None:
+        if not node.location.valid():
+            raise UsageError(
+                f"{self.path}, node {node.id}: expected lon in degrees from -180 to 180 and lat "
+                "from -90 to 90"
+            )
+        self.nodes[node.id] = (node.lon, node.lat)
+        tags = dict(node.tags)
+        if tags:
+            self.node_tags[node.id] = tags
+
+    def _enter_way(self, way: ReadWay) -> None:
+        nodes = [node.ref for node in way.nodes]
+        if 0 in nodes:
+            raise UsageError(
+                f"{self.path}, way {way.id}: expected a node's id in each <nd>, as ref"
+            )
+        # Overpass' `out geom` writes the positions of nodes into the ways.
+        for node in way.nodes:
+            if node.location.valid():
+                self.nodes.setdefault(node.ref, (node.lon, node.lat))
+        self.ways[way.id] = Way(way.id, nodes, dict(way.tags))
+
+
+def _remove_deleted(found: _Elements, content: bytes) -> None:
+    """Remove what JOSM has marked as deleted, which libosmium does not read.
+
+    Raises UsageError if Overpass remarks that it did not finish.
+    """
+    if b"<remark" not in content and b"action=" not in content:
+        return
+
+    for _, element in ElementTree.iterparse(BytesIO(content)):
+        if element.tag in ("node", "way", "relation") and element.get("action") == "delete":
+            found.remove(element.tag[0], int(element.get("id", 0)))
+        if element.tag == "remark" and "error" in (element.text or ""):
+            raise UsageError(
+                f"{found.path} is not whole, as Overpass remarks ({(element.text or '').strip()}): "
+                "ask it for a smaller area, or for less"
+            )
+        if element.tag not in ("nd", "tag", "member"):
+            element.clear()
 
 
 @dataclass
@@ -112,19 +189,9 @@ class _Multipolygon:
     tags: Tags
 
 
-def _is_building(relation: Relation) -> bool:
-    tags = relation.tags
-    return tags.get("type") == "multipolygon" and "building" in tags
-
-
-def _outlined(relation: Relation) -> _Multipolygon:
-    members = [each for each in relation.members if each.type == "w" and each.role != "inner"]
-    return _Multipolygon(relation.id, [each.ref for each in members], dict(relation.tags))
-
-
 def _rings(outlined: _Multipolygon, way_of: dict[int, Way]) -> list[Way]:
-    """The outer rings of a multipolygon, none where it is not whole in the extract, or no more than
-    a way that is a building itself.
+    """Return the outer rings of a multipolygon; none if it is not whole in the extract, or no more
+    than a way that is a building itself.
     """
     if not all(way in way_of for way in outlined.ways):
         return []
@@ -142,7 +209,7 @@ def _rings(outlined: _Multipolygon, way_of: dict[int, Way]) -> list[Way]:
 
 
 def _joined(lines: list[list[int]]) -> list[int]:
-    """The first of lines of nodes with those that continue it, which are taken from `lines`."""
+    """Join the first of `lines` of nodes with those that continue it, taking them from `lines`."""
     joined = list(lines.pop(0))
     while joined[0] != joined[-1]:
         following = next((line for line in lines if joined[-1] in (line[0], line[-1])), None)

@@ -1,4 +1,4 @@
-"""Street graphs as JSON Lines, plain or packed by gzip, bzip2 or xz.
+"""Street graphs as JSON Lines, plain or packed.
 
 A city a line: `city`, `nodes_lonlat`, and `edges_u_v_len_highway_name_geom`, or `edges` for short,
 each of them [from, to, length_m, highway, name, polyline or null].
@@ -12,10 +12,9 @@ from typing import Annotated, Any
 
 import msgspec
 
-from cogmap.data.lines import wrong_line
-from cogmap.data.packed import lines
+from cogmap.data.text import PACKED, Line, numbered_lines
 
-SUFFIXES = (".jsonl", ".jsonl.gz", ".jsonl.xz", ".jsonl.bz2")
+SUFFIXES = tuple(f".jsonl{packed}" for packed in PACKED)
 Lon = Annotated[float, msgspec.Meta(ge=-180, le=180)]
 Lat = Annotated[float, msgspec.Meta(ge=-90, le=90)]
 _POLYLINE = 5
@@ -35,8 +34,8 @@ class StreetGraph(msgspec.Struct):
         self.edges = self.edges or self.edges_u_v_len_highway_name_geom
 
     def line(self, edge: list[Any]) -> list[tuple[float, float]]:
-        """An edge's points in degrees, from its first node to its second, whichever direction its
-        polyline has; the ends are exactly the nodes.
+        """Return an edge's points in degrees, from its first node to its second, in whichever
+        direction its polyline is; the ends are exactly the nodes.
         """
         start = self.nodes_lonlat[edge[0]]
         end = self.nodes_lonlat[edge[1]]
@@ -55,34 +54,23 @@ class StreetGraph(msgspec.Struct):
 
 
 def read(path: Path) -> list[StreetGraph]:
-    """Every city in a file. Raises UsageError naming file, line and what was expected there."""
-    graphs = []
-    for number, line in enumerate(lines(path, "street graphs as JSON Lines"), start=1):
-        text = line.decode("utf-8", "replace")
-        if text.strip():
-            graphs.append(_graph(path, number, text))
-    return graphs
+    """Read every city in a file. Raises UsageError naming file, line and what was expected."""
+    lines = numbered_lines(path, "street graphs as JSON Lines")
+    return [_graph(line) for line in lines if line.text.strip()]
 
 
-def _graph(path: Path, number: int, line: str) -> StreetGraph:
+def _graph(line: Line) -> StreetGraph:
     try:
-        graph = msgspec.json.decode(line, type=StreetGraph)
+        graph = msgspec.json.decode(line.text, type=StreetGraph)
     except (msgspec.DecodeError, msgspec.ValidationError) as error:
-        raise wrong_line(path, number, line, f"a street graph ({error})") from None
+        raise line.wrong(f"a street graph ({error})") from None
 
     if not graph.edges:
-        raise wrong_line(path, number, line, "a street graph with edges")
+        raise line.wrong("a street graph with edges")
     count = len(graph.nodes_lonlat)
     for edge in graph.edges:
-        if not _is_edge(edge, count):
-            expected = f"an edge between two of {count} nodes, by their numbers"
-            raise wrong_line(path, number, str(edge), expected)
+        ends = edge[:2]
+        if len(ends) < 2 or not all(isinstance(end, int) and 0 <= end < count for end in ends):
+            wrong = line._replace(text=str(edge))
+            raise wrong.wrong(f"an edge between two of {count} nodes, by their numbers")
     return graph
-
-
-def _is_edge(edge: list[Any], nodes: int) -> bool:
-    """Whether an edge begins with the numbers of two of the `nodes`."""
-    ends = edge[:2]
-    if len(ends) < 2:
-        return False
-    return all(isinstance(end, int) and 0 <= end < nodes for end in ends)

@@ -1,13 +1,13 @@
-"""Travelling salesman problems and tours as TSPLIB writes them (Reinelt 1991), plain or packed by
-xz.
+"""Travelling salesman problems and tours as TSPLIB writes them (Reinelt 1991).
 
 Lengths are rounded exactly as TSPLIB95 prescribes, so that published optima can be compared with.
 """
 
 from __future__ import annotations
 
+import logging
 import math
-from collections.abc import Iterator
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -15,8 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.lines import wrong_line
-from cogmap.data.pose_graph import numbered_lines
+from cogmap.data.text import PACKED, Line, numbered_lines, plain_or_packed
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats, Indices
 
@@ -24,23 +23,31 @@ EUC_2D = "EUC_2D"
 ATT = "ATT"
 GEO = "GEO"
 WEIGHT_TYPES = (EUC_2D, ATT, GEO)
-SUFFIXES = (".tsp", ".tsp.xz")
-TOUR_SUFFIXES = (".opt.tour", ".opt.tour.xz")
+SUFFIXES = tuple(f".tsp{packed}" for packed in PACKED)
+TOUR_SUFFIX = ".opt.tour"
 
 _WEIGHT_TYPE = "EDGE_WEIGHT_TYPE"
+_DIMENSION = "DIMENSION"
 _COORDINATES = "NODE_COORD_SECTION"
 _TOUR = "TOUR_SECTION"
-_END = "EOF"
-_TOUR_END = -1
+# Sections that leave a problem what it is; any other, such as FIXED_EDGES_SECTION, changes it.
+_PLAIN_SECTIONS = (_COORDINATES, "DISPLAY_DATA_SECTION")
+_SECTION_END = "-1"
+# TSPLIB95, section 1.1: they are known without their colon, too.
+_KEYS = (
+    *("NAME", "TYPE", "COMMENT", "DIMENSION", "CAPACITY"),
+    *("EDGE_WEIGHT_TYPE", "EDGE_WEIGHT_FORMAT", "EDGE_DATA_FORMAT"),
+    *("NODE_COORD_TYPE", "DISPLAY_DATA_TYPE"),
+)
+_KEY = re.compile(r"\s*([A-Za-z]\w*)\s*(:?)\s*(.*)")
 # TSPLIB's own value of pi: with another one, some lengths come out one kilometre different.
 _GEO_PI = 3.141592
 _GEO_RADIUS_KM = 6378.388
-
-Line = tuple[int, str]
+log = logging.getLogger("cogmap")
 
 
 class UnsupportedProblemError(UsageError):
-    """A problem whose lengths are of a type that is not read."""
+    """A problem of a kind that is not read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,58 +72,116 @@ class Problem:
 
 
 class Folder(NamedTuple):
-    """The problems of a folder, and for each file whose type is not read, why."""
+    """The problems of a folder, and why each of the others was left out."""
 
     problems: list[Problem]
     left_out: list[str]
 
 
-@dataclass(frozen=True)
 class _File:
-    """The key words of a file, each with the line it stands on, and the lines of its section."""
+    """A file's key words, each with its line and value, and its sections, line by line.
 
-    path: Path
-    keys: dict[str, tuple[Line, str]]
-    section: list[Line]
+    A section's name, with or without a colon, begins a section; lines that are no key word belong
+    to the section before them.
+    """
 
-    def value(self, key: str) -> str:
-        """The value of a key word. Raises UsageError where it is missing."""
-        if key not in self.keys:
-            raise UsageError(f"{self.path} has no line {key}: give a whole TSPLIB file")
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.values: dict[str, tuple[Line, str]] = {}
+        self.sections: dict[str, list[Line]] = {}
+        section: list[Line] | None = None
 
-        _, value = self.keys[key]
-        return value
+        for line in numbered_lines(path, "a TSPLIB file"):
+            found = _KEY.fullmatch(line.text)
+            key = found[1].upper() if found else ""
+            if key == "EOF":
+                break
+            if key.endswith("_SECTION"):
+                self.values[key] = line, ""
+                section = self.sections.setdefault(key, [])
+            elif found and (key in _KEYS or found[2]):
+                self.values[key] = line, found[3].strip()
+                section = None
+            elif section is not None and line.text.strip():
+                section.append(line)
+            elif line.text.strip():
+                raise line.wrong(f"KEY : VALUE, or {_COORDINATES}")
 
-    def wrong(self, key: str, expected: str) -> UsageError:
-        """The error for the line of a key word that is there."""
-        (number, line), _ = self.keys[key]
-        return wrong_line(self.path, number, line, expected)
+    def section(self, name: str) -> list[Line]:
+        """Return the lines of a section up to a line -1. Raises UsageError if it is missing."""
+        if name not in self.sections:
+            raise UsageError(f"{self.path} has no {name}: give a TSPLIB file with one")
+
+        rows = []
+        for line in self.sections[name]:
+            if line.text.strip() == _SECTION_END:
+                break
+            rows.append(line)
+        return rows
+
+    def dimension(self) -> int:
+        """Return the number of nodes. Raises UsageError if it is missing, or none."""
+        if _DIMENSION not in self.values:
+            raise UsageError(f"{self.path} has no line {_DIMENSION}: give a whole TSPLIB file")
+
+        line, value = self.values[_DIMENSION]
+        if not value.isdecimal() or int(value) < 1:
+            raise line.wrong("a number of nodes, 1 at least")
+        return int(value)
 
 
 def read(path: Path) -> Problem:
-    """The problem in a file.
+    """Read the problem in a file, plain or packed.
 
-    Raises UsageError naming file and line where something is wrong, UnsupportedProblemError where
-    its lengths are of another type.
+    Raises UsageError naming file, line and remedy; UnsupportedProblemError for one of another kind.
     """
-    file = _read(path, _COORDINATES)
-    weight_type = file.value(_WEIGHT_TYPE)
-    return Problem(stem(path), weight_type, _positions(file))
+    file = _File(path)
+    if _WEIGHT_TYPE not in file.values:
+        raise UsageError(f"{path} has no line {_WEIGHT_TYPE}: give a whole TSPLIB file")
+    type_line, value = file.values[_WEIGHT_TYPE]
+    weight_type, *_ = value.split() or [""]
+    if weight_type not in WEIGHT_TYPES:
+        raise _unsupported(type_line, f"one of {', '.join(WEIGHT_TYPES)}")
+    for name in file.sections:
+        if name not in _PLAIN_SECTIONS:
+            raise _unsupported(file.values[name][0], f"no section but {_COORDINATES}")
+
+    rows: list[tuple[float, float]] = []
+    for node, line in enumerate(file.section(_COORDINATES), start=1):
+        words = line.text.split()
+        try:
+            x, y = map(float, words[1:])
+        except ValueError:
+            x = y = math.nan
+        if words[0] != str(node) or not math.isfinite(x) or not math.isfinite(y):
+            raise line.wrong(f"{node} and two coordinates", "number the nodes from 1, in order")
+        rows.append((x, y))
+
+    if len(rows) != file.dimension():
+        line, _ = file.values[_DIMENSION]
+        raise line.wrong(f"{len(rows)}, the number of nodes in the file")
+    return Problem(stem(path), weight_type, np.array(rows))
+
+
+def _unsupported(line: Line, expected: str) -> UnsupportedProblemError:
+    return UnsupportedProblemError(str(line.wrong(expected, "such problems are not read")))
 
 
 def read_tour(path: Path) -> Indices:
-    """The order (n,) of the nodes in a file of a tour, counted from 0.
+    """Read the order (n,) of the nodes in a file of a tour, counted from 0.
 
-    Raises UsageError naming file and line where a node is missing, unknown or visited twice.
+    Raises UsageError naming file and line for a node that is missing, unknown or visited twice.
     """
-    file = _read(path, _TOUR)
-    dimension = _dimension(file)
+    file = _File(path)
+    words = [(line, word) for line in file.section(_TOUR) for word in line.text.split()]
+    words = [(line, word) for line, word in words if word != _SECTION_END]
+    dimension = file.dimension() if _DIMENSION in file.values else len(words)
     visited: dict[int, None] = {}
 
-    for number, line, node in _nodes(file):
+    for line, word in words:
+        node = int(word) if word.isdecimal() else 0
         if not 1 <= node <= dimension or node in visited:
-            expected = f"a node from 1 to {dimension} that was not visited before"
-            raise wrong_line(path, number, line, expected)
+            raise line.wrong(f"a node from 1 to {dimension} that was not visited before")
         visited[node] = None
 
     if len(visited) != dimension:
@@ -124,17 +189,10 @@ def read_tour(path: Path) -> Indices:
     return np.array(list(visited), np.int64) - 1
 
 
-def _nodes(file: _File) -> Iterator[tuple[int, str, int]]:
-    """The nodes of a tour, each with the line that it stands on; 0 for what is no number."""
-    for number, line in file.section:
-        for word in line.split():
-            node = int(word) if word.lstrip("-").isdigit() else 0
-            if node != _TOUR_END:
-                yield number, line, node
-
-
 def folder(path: Path) -> Folder:
-    """The TSPLIB files in a folder, by name. Raises UsageError where none can be read."""
+    """Read the TSPLIB files in a folder, by name; those of a kind that is not read are left out,
+    with a warning. Raises UsageError if none can be read.
+    """
     if not path.is_dir():
         raise UsageError(f"there is no folder {path}: give one with TSPLIB files")
 
@@ -146,34 +204,35 @@ def folder(path: Path) -> Folder:
             found.problems.append(read(file))
         except UnsupportedProblemError as error:
             found.left_out.append(str(error))
+            log.warning("left out: %s", error)
 
     if not found.problems:
         types = ", ".join(WEIGHT_TYPES)
-        raise UsageError(f"{path} has no {' or '.join(SUFFIXES)} of the types {types}: give one")
+        raise UsageError(f"{path} has no .tsp, plain or packed, of the types {types}: give one")
     return found
 
 
 def optimal_tour(path: Path, problem: Problem) -> Indices | None:
-    """The tour that a folder gives as the shortest of a problem, NAME.opt.tour; None without one.
+    """Read the tour that a folder has as the shortest of a problem, NAME.opt.tour; None without
+    one.
 
-    Raises UsageError where it is a tour of another number of nodes.
+    Raises UsageError if it is a tour of another number of nodes.
     """
-    for suffix in TOUR_SUFFIXES:
-        file = path / f"{problem.name}{suffix}"
-        if file.exists():
-            tour = read_tour(file)
-            if len(tour) != len(problem):
-                raise UsageError(
-                    f"{file} has {len(tour)} nodes, {problem.name} {len(problem)}: "
-                    "give the tour of that problem"
-                )
-            return tour
+    file = plain_or_packed(path, f"{problem.name}{TOUR_SUFFIX}")
+    if file is None:
+        return None
 
-    return None
+    tour = read_tour(file)
+    if len(tour) != len(problem):
+        raise UsageError(
+            f"{file} has {len(tour)} nodes, {problem.name} {len(problem)}: "
+            "give the tour of that problem"
+        )
+    return tour
 
 
 def stem(path: Path) -> str:
-    """The name of a file without what tells its kind: berlin52 of berlin52.tsp.xz."""
+    """Return the name of a file without what describes its kind: berlin52 of berlin52.tsp.xz."""
     name, _, _ = path.name.partition(".")
     return name
 
@@ -201,7 +260,10 @@ def straight(positions: Floats) -> Floats:
 
 def _geo_km(positions: Floats) -> Floats:
     """(n, n): whole kilometres along great circles between latitudes and longitudes as DDD.MM."""
-    latitude, longitude = _geo_radians(positions).T
+    degrees = np.trunc(positions)
+    minutes = positions - degrees
+    latitude, longitude = (_GEO_PI * (degrees + 5.0 * minutes / 3.0) / 180.0).T
+
     across = np.cos(longitude[:, None] - longitude)
     apart = np.cos(latitude[:, None] - latitude)
     opposite = np.cos(latitude[:, None] + latitude)
@@ -211,72 +273,3 @@ def _geo_km(positions: Floats) -> Floats:
     distances_km = np.floor(_GEO_RADIUS_KM * angle + 1.0)
     np.fill_diagonal(distances_km, 0.0)
     return np.asarray(distances_km)
-
-
-def _geo_radians(positions: Floats) -> Floats:
-    """(n, 2), of latitudes and longitudes as DDD.MM."""
-    degrees = np.trunc(positions)
-    minutes = positions - degrees
-    decimal = degrees + 5.0 * minutes / 3.0
-    return np.asarray(_GEO_PI * decimal / 180.0)
-
-
-def _read(path: Path, section: str) -> _File:
-    """The key words before `section`, and its lines. Raises UsageError where it is not there."""
-    lines = numbered_lines(path)
-    keys: dict[str, tuple[Line, str]] = {}
-
-    for number, line in lines:
-        key, colon, value = line.partition(":")
-        if line.strip() == section:
-            return _File(path, keys, list(_until_end(lines)))
-        if key.strip() == _WEIGHT_TYPE and value.strip() not in WEIGHT_TYPES:
-            expected = f"one of {', '.join(WEIGHT_TYPES)}"
-            raise UnsupportedProblemError(str(wrong_line(path, number, line, expected)))
-        if colon:
-            keys[key.strip()] = ((number, line), value.strip())
-        elif line.strip():
-            raise wrong_line(path, number, line, f"KEY : VALUE, or {section}")
-
-    raise UsageError(f"{path} has no {section}: give a TSPLIB file with one")
-
-
-def _until_end(lines: Iterator[Line]) -> Iterator[Line]:
-    for number, line in lines:
-        if line.strip() == _END:
-            return
-        if line.strip():
-            yield number, line
-
-
-def _dimension(file: _File) -> int:
-    value = file.value("DIMENSION")
-    if not value.isdigit() or int(value) < 1:
-        raise file.wrong("DIMENSION", "a number of nodes, 1 at least")
-    return int(value)
-
-
-def _positions(file: _File) -> Floats:
-    """(n, 2), a line each: the node's number, counted from 1 in order, and two coordinates."""
-    dimension = _dimension(file)
-    rows: list[tuple[float, float]] = []
-
-    for number, line in file.section:
-        rows.append(_position(file.path, number, line, len(rows) + 1))
-
-    if len(rows) != dimension:
-        raise file.wrong("DIMENSION", f"{len(rows)}, the number of nodes in the file")
-    return np.array(rows)
-
-
-def _position(path: Path, number: int, line: str, node: int) -> tuple[float, float]:
-    """The coordinates of a line that begins with `node`."""
-    words = line.split()
-    try:
-        x, y = map(float, words[1:])
-    except ValueError:
-        x = y = math.nan
-
-    if words[0] != str(node) or not math.isfinite(x) or not math.isfinite(y):
-        raise wrong_line(path, number, line, f"{node} and two coordinates")
-    return x, y

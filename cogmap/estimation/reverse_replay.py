@@ -13,11 +13,17 @@ gradients; with them a handful of replays closes a few loops, and some hundred c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from cogmap.estimation.pose_graph import Constraints, PoseGraph, matvec, residuals
+from cogmap.estimation.pose_graph import (
+    Constraints,
+    PoseGraph,
+    diagonal_information,
+    matvec,
+    residuals,
+)
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import cumulative, rotate, rotation_matrices
 
@@ -194,6 +200,36 @@ def close_loops(graph: PoseGraph, tolerance: float = 0.01, max_replays: int = 50
         cost=total,
         least_cost=bound,
     )
+
+
+def with_positions_only(graph: PoseGraph) -> PoseGraph:
+    """The path of which headings are not corrected: the positions take up their errors.
+
+    A turn of variance h somewhere on a loop of length L moves its end by a variance of h L^2 / 3 on
+    the mean. Where a landmark is seen from, the headings of all the loop turn.
+    """
+    loops = graph.closures + graph.joins
+    if not len(loops):
+        return graph
+
+    def between_ends(values: Floats) -> Floats:
+        """(m,): the sum of (n,) values of the steps between the ends of each loop."""
+        summed = cumulative(values)
+        return np.asarray(np.abs(summed[loops.j] - summed[loops.i]))
+
+    steps = graph.steps
+    lengths_m = between_ends(np.hypot(*steps.measurement[:, :2].T))
+    by_heading_m2 = (lengths_m**2).mean() / 3 * steps.variance_rad2
+    information = diagonal_information(
+        position=1 / (steps.variance_m2 + by_heading_m2),
+        heading=steps.information[:, 2, 2],
+    )
+
+    # The lever arms of views turn with the headings along their loops.
+    lever_arms2 = (loops.information[:, :2, 2] ** 2).sum(axis=1)
+    variance_share = lever_arms2 / loops.information[:, 0, 0] * between_ends(steps.variance_rad2)
+    weakened = replace(steps, information=information)
+    return PoseGraph(graph.poses, weakened, loops.weighted(1 / (1 + variance_share)))
 
 
 class _ConjugateGradients:

@@ -93,6 +93,16 @@ def integrate(start: Floats, steps: Floats) -> Floats:
     return np.column_stack([positions_m, headings_rad])
 
 
+def moved_by(pose: Floats, motions: Floats) -> Floats:
+    """(3,): the pose that a self-motion leads to from `pose`, of (n, 3 or more) rows that begin
+    with speed in m/s, turn rate in rad/s and duration in s.
+    """
+    speed, turn_rate, duration_s = motions[:, :3].T
+    steps = np.column_stack([speed * duration_s, np.zeros(len(motions)), turn_rate * duration_s])
+    moved: Floats = integrate(pose, steps)[-1]
+    return moved
+
+
 def mean_pose(poses: Floats) -> Floats:
     """(3,): the mean of n poses, of the headings the mean direction. Columns after those of the
     pose are ignored, (n, 3 or more).

@@ -98,6 +98,10 @@ class Answer:
     events: list[Event] = field(default_factory=list)
 
 
+class NoSettings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The settings of a codelet that has none."""
+
+
 @dataclass(frozen=True)
 class Codelet:
     """One structure-building or attention codelet.
@@ -106,7 +110,7 @@ class Codelet:
     `due(context, graph, config)` returns its tasks for this cycle, `run(task, graph, config)` its
     answer to one. Both only read the graph. `reads` and `writes` are the kinds of nodes and links
     and the place columns that it reads and may write. `config` is the type of its settings, from
-    the section `section` of the configuration.
+    the section `section` of the configuration; one without settings has neither.
     """
 
     name: str
@@ -115,8 +119,8 @@ class Codelet:
     run: Callable[[Task, Graph, Any], Answer]
     reads: frozenset[Written]
     writes: frozenset[Written]
-    config: type[msgspec.Struct]
-    section: str
+    config: type[msgspec.Struct] = NoSettings
+    section: str = ""
 
     def may_write(self, written: object) -> bool:
         """Whether it may write nodes or links of that kind, or that place column.

@@ -86,6 +86,15 @@ def typed(sections: Sections, name: str, kind: type[C]) -> C:
         raise ConfigError(f"[{name}] {error}".replace("`$.", f"`{name}.")) from None
 
 
+def recorded(sections: Sections, name: str, kind: type[C]) -> C:
+    """Section `name` of a log as a `kind`, without the keys that another version had. Raises
+    ConfigError as `typed` does.
+    """
+    fields = {field.encode_name for field in msgspec.structs.fields(kind)}
+    section = sections.get(name, {})
+    return typed({name: {key: section[key] for key in section.keys() & fields}}, name, kind)
+
+
 def _check_finite(path: str, value: Any) -> None:
     """Raise ConfigError where `value`, or a value in it, is NaN or infinite."""
     if isinstance(value, float) and not math.isfinite(value):

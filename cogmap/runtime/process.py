@@ -88,11 +88,12 @@ def run_module(
     endpoint: str = DEFAULT_ENDPOINT,
     agent: str = DEFAULT_AGENT,
     state: Path | None = None,
-    stop: Stop | None = None,
     *,
+    tied: bool = False,
     memory: Path | None = None,
 ) -> None:
-    """Run `module` as this process, until `stop` is asked: by default, until a signal to end.
+    """Run `module` as this process until a signal to end or, if it is `tied`, the end of its
+    parent.
 
     It connects to the router at `endpoint` as one of `agent`'s; what it must keep is in the folder
     `state`, and what it remembers for later runs in the database `memory`. Raises NoRouterError,
@@ -101,7 +102,6 @@ def run_module(
     """
     check_name("--instance", module.instance)
     keep_freed_memory()
-    stop = stop or Stop()
     if module.remembers:
         give_way()
     journal = None
@@ -112,7 +112,9 @@ def run_module(
             journal = Journal(state / f"{module.instance}.journal")
 
     store = Store(memory) if memory is not None and module.remembers else None
-    shell = Shell(module, ZenohBus(endpoint, agent), journal, counts=counts, store=store)
+    bus = ZenohBus(endpoint, agent)
+    stop = Stop(tied)  # only now: until a router answers, a signal ends the process at once
+    shell = Shell(module, bus, journal, counts=counts, store=store)
     try:
         shell.open()
         log.info("%s is ready", module.instance)

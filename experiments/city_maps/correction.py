@@ -18,12 +18,9 @@ def settings(method: str, step_m: float) -> Sections:
         "path_spacing_m": step_m / 2,
         "place_match_sd_m": PLACE_SD_M,
         "place_match_sd_rad": PLACE_SD_RAD,
-        # The percepts of points err independently, and alike from all sides.
-        "landmark_sides": 1,
-        "correlated_sightings": 1.0,
+        "landmarks": "points",
         # The whole path is evaluated.
         "sparse_after_s": NEVER_S,
-        "waiting_share": 0.0,
     }
 
     if method == "none":

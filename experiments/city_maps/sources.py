@@ -10,14 +10,14 @@ from typing import TypeVar
 import numpy as np
 
 from cogmap.data import osm, street_graphs
-from cogmap.data.osm import Extract, Tags, Way
+from cogmap.data.osm import Extract, Tags
 from cogmap.data.street_graphs import StreetGraph
 from cogmap.errors import UsageError
 from cogmap.experiments.city_maps.environment import City, Environment, environments
 from cogmap.experiments.city_maps.streets import Indices, Points, Streets
+from cogmap.geometry.geographic import continuous, plane_m
 from cogmap.geometry.se2 import rotate
 
-EARTH_M = 6_371_008.8
 STREETS = frozenset(
     f"{kind}{link}"
     for kind in ("trunk", "primary", "secondary", "tertiary")
@@ -32,7 +32,7 @@ FRONT_M = 14.0
 EVERY_M = 45.0
 CORNER_M = 15.0
 MIN_CORNERS = 3
-MANY_NAMED = 40
+MIN_NAMED = 40
 LonLat = tuple[float, float]
 Point = TypeVar("Point", bound=Hashable)
 
@@ -49,13 +49,20 @@ def from_osm(path: Path) -> City:
 
 def streets_of(extract: Extract, path: Path) -> Streets:
     """The streets of the extract in a file. Raises UsageError where there are none."""
-    ways = [way for way in extract.ways if _is_street(way)]
+    ways = [
+        way
+        for way in extract.ways
+        if way.tags.get("highway") in STREETS and way.tags.get("area") != "yes"
+    ]
     if not ways or not extract.nodes:
         raise UsageError(
             f"{path} has no streets: give an extract with ways that are tagged highway=…"
         )
 
-    return _streets(extract, ways, middle_of(extract))
+    lines = [piece for way in ways for piece in extract.pieces(way)]
+    nodes, pieces = _pieces(lines)
+    lonlat = np.array([extract.nodes[node] for node in nodes])
+    return Streets(plane_m(lonlat, middle_of(extract)), pieces)
 
 
 def middle_of(extract: Extract) -> Points:
@@ -66,12 +73,10 @@ def middle_of(extract: Extract) -> Points:
 
 def from_street_graph(graph: StreetGraph, seed: int) -> City:
     """A city of real streets, which has no buildings: houses are put along them, from a seed."""
-    nodes_lonlat = np.array(graph.nodes_lonlat)
-    middle = nodes_lonlat.mean(axis=0)
-
+    middle = continuous(np.array(graph.nodes_lonlat)).mean(axis=0)
     lines = [graph.line(edge) for edge in graph.edges]
     lonlat, pieces = _pieces(lines)
-    points_m = plane_m(np.array(lonlat), middle)
+    points_m = plane_m(continuous(np.array(lonlat)), middle)
     streets = Streets(points_m, pieces).connected()
 
     rng = np.random.default_rng([seed, 0xA10])
@@ -107,7 +112,10 @@ def grown(seed: int) -> City:
     """
     rng = np.random.default_rng([seed, 0xC17])
     points_m = _bent_grid_m(rng)
-    pieces = _grid_pieces()
+    grid = np.arange(GRID_SIDE**2).reshape(GRID_SIDE, GRID_SIDE)
+    along = np.stack([grid[:-1], grid[1:]], axis=-1).reshape(-1, 2)
+    across = np.stack([grid[:, :-1], grid[:, 1:]], axis=-1).reshape(-1, 2)
+    pieces = np.vstack([along, across])
 
     is_left = rng.random(len(pieces)) < STREETS_LEFT
     streets = Streets(points_m, pieces[is_left]).connected()
@@ -125,18 +133,6 @@ def grown_environments(number: int, seed: int) -> list[Environment]:
     return found
 
 
-def plane_m(lonlat: Points, middle: Points) -> Points:
-    """Metres east and north of `middle`, (n, 2), from degrees: good to a thousandth within some
-    kilometres.
-    """
-    degree_m = np.radians(1.0) * EARTH_M
-    lat_rad = np.radians(middle[1])
-    shares = np.array([np.cos(lat_rad), 1.0])
-
-    offsets = lonlat.reshape(-1, 2) - middle
-    return np.asarray(offsets * shares * degree_m)
-
-
 def _bent_grid_m(rng: np.random.Generator) -> Points:
     """(GRID_SIDE^2, 2) crossings of blocks of many sizes, moved about, and all turned by chance."""
     blocks_m = rng.uniform(*BLOCK_M, (2, GRID_SIDE))
@@ -149,20 +145,6 @@ def _bent_grid_m(rng: np.random.Generator) -> Points:
     turn_rad = float(rng.uniform(0, np.pi))
     centred_m = points_m - points_m.mean(axis=0)
     return rotate(centred_m, turn_rad)
-
-
-def _grid_pieces() -> Indices:
-    """(m, 2): the neighbours along both axes of a grid."""
-    numbers = np.arange(GRID_SIDE**2)
-    grid = numbers.reshape(GRID_SIDE, GRID_SIDE)
-    along = _pairs(grid[:-1], grid[1:])
-    across = _pairs(grid[:, :-1], grid[:, 1:])
-    return np.vstack([along, across])
-
-
-def _pairs(first: Indices, second: Indices) -> Indices:
-    """(m, 2): the elements of two arrays of one shape, side by side."""
-    return np.column_stack([first.ravel(), second.ravel()])
 
 
 def _with_houses(name: str, streets: Streets, rng: np.random.Generator) -> City:
@@ -195,24 +177,6 @@ def _along(start_m: Points, end_m: Points, rng: np.random.Generator) -> Points:
     return np.asarray(on_street_m + to_side_m)
 
 
-def _is_street(way: Way) -> bool:
-    kind = way.tags.get("highway")
-    is_area = way.tags.get("area") == "yes"
-    return kind in STREETS and not is_area
-
-
-def _streets(extract: Extract, ways: list[Way], middle: Points) -> Streets:
-    lines = [_known_nodes(extract, way) for way in ways]
-    nodes, pieces = _pieces(lines)
-    lonlat = np.array([extract.nodes[node] for node in nodes])
-    return Streets(plane_m(lonlat, middle), pieces)
-
-
-def _known_nodes(extract: Extract, way: Way) -> list[int]:
-    """The nodes of a way whose positions the extract has."""
-    return [node for node in way.nodes if node in extract.nodes]
-
-
 def _pieces(lines: Iterable[Sequence[Point]]) -> tuple[list[Point], Indices]:
     """The different points of all lines, and the pieces (m, 2) between them, by their numbers."""
     number: dict[Point, int] = {}
@@ -240,32 +204,21 @@ def _buildings(extract: Extract) -> tuple[tuple[str, ...], Points]:
             named.setdefault(tags["name"], extract.nodes[node])
 
     for way in extract.ways:
-        centre = _centre(extract, way)
-        if centre is None or not _is_building(way):
+        corners = [extract.nodes[node] for node in way.nodes[:-1] if node in extract.nodes]
+        is_building = "building" in way.tags or _is_known(way.tags)
+        if len(corners) < MIN_CORNERS or not is_building:
             continue
 
+        lon, lat = np.mean(corners, axis=0).tolist()
+        centre = lon, lat
         if "name" in way.tags:
             named.setdefault(way.tags["name"], centre)
         else:
             unnamed[f"building {way.id}"] = centre
 
-    found = named if len(named) >= MANY_NAMED else named | unnamed
+    found = named if len(named) >= MIN_NAMED else named | unnamed
     lonlat = np.array(list(found.values()))
     return tuple(found), lonlat.reshape(-1, 2)
-
-
-def _centre(extract: Extract, way: Way) -> LonLat | None:
-    """The mean of a closed way's corners; None where it has too few."""
-    corners = [extract.nodes[node] for node in way.nodes[:-1] if node in extract.nodes]
-    if len(corners) < MIN_CORNERS:
-        return None
-
-    lon, lat = np.mean(corners, axis=0).tolist()
-    return lon, lat
-
-
-def _is_building(way: Way) -> bool:
-    return "building" in way.tags or _is_known(way.tags)
 
 
 def _is_known(tags: Tags) -> bool:

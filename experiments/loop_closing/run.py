@@ -94,7 +94,6 @@ def sections(seed: int, method: str) -> Sections:
         "path_variance_per_m": NOISE.speed**2 * step_m,
         "heading_variance_per_m": NOISE.drift_rad_per_sqrt_m**2,
         "heading_variance_per_rad": NOISE.turn**2 * CORNER_RAD,
-        "waiting_share": 0.0,
     }
 
     return {

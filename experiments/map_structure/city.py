@@ -6,6 +6,7 @@ known. Railways, water, walls, fences and main roads are boundaries, other stree
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,12 +14,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from cogmap.data import osm
-from cogmap.data.osm import Extract, Tags, Way
+from cogmap.data.osm import Extract, Tags
 from cogmap.errors import UsageError
-from cogmap.experiments.city_maps.sources import middle_of, name_of, plane_m, streets_of
+from cogmap.experiments.city_maps.sources import middle_of, name_of, streets_of
 from cogmap.experiments.city_maps.streets import Streets
 from cogmap.experiments.map_structure.functions import FUNCTIONS, function_of
 from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.geographic import plane_m
 
 UNKNOWN = -1
 MIN_OBJECTS = 20
@@ -79,7 +81,7 @@ def _buildings(extract: Extract, middle: Floats) -> tuple[Floats, Floats, Indice
     half_widths_m = []
     functions = []
     for way in extract.ways:
-        corners_m = _line_m(extract, way, middle)
+        corners_m = _line_m(extract, way.nodes, middle)
         if "building" not in way.tags or len(corners_m) < MIN_CORNERS:
             continue
 
@@ -132,9 +134,10 @@ def _boundaries(extract: Extract, middle: Floats) -> Floats:
     """(m, 2, 2): the pieces of all ways that separate."""
     pieces_m = [np.zeros((0, 2, 2))]
     for way in extract.ways:
-        line_m = _line_m(extract, way, middle)
-        if _separates(way.tags) and len(line_m) > 1:
-            pieces_m.append(np.stack([line_m[:-1], line_m[1:]], axis=1))
+        if _separates(way.tags):
+            for piece in extract.pieces(way):
+                line_m = _line_m(extract, piece, middle)
+                pieces_m.append(np.stack([line_m[:-1], line_m[1:]], axis=1))
 
     return np.concatenate(pieces_m)
 
@@ -160,10 +163,10 @@ def _places(extract: Extract, middle: Floats) -> Floats:
     return plane_m(np.array(lonlat), middle) if lonlat else np.zeros((0, 2))
 
 
-def _line_m(extract: Extract, way: Way, middle: Floats) -> Floats:
-    """(k, 2): the corners of a way that the extract has."""
-    lonlat = [extract.nodes[node] for node in way.nodes if node in extract.nodes]
-    return plane_m(np.array(lonlat).reshape(-1, 2), middle)
+def _line_m(extract: Extract, nodes: Iterable[int], middle: Floats) -> Floats:
+    """Return the positions of those of the nodes that the extract has, (k, 2)."""
+    lonlat = [extract.nodes[node] for node in nodes if node in extract.nodes]
+    return plane_m(np.array(lonlat), middle)
 
 
 def _code(tags: Tags) -> int:

@@ -55,7 +55,15 @@ from cogmap.schemas.nodes.path import Correction, LoopClosure, Observations, Pat
 from cogmap.schemas.nodes.planning import Goal, Plan, PlanState
 from cogmap.schemas.nodes.recollection import Recollection, SubMap
 from cogmap.schemas.nodes.rules import KINDS, AnyNode, KindRules, kind_name, kind_of
-from cogmap.schemas.nodes.situation import FUNCTIONS, Map, Object, Percept, Self
+from cogmap.schemas.nodes.situation import (
+    FUNCTIONS,
+    Map,
+    Misfits,
+    Object,
+    PathIntegration,
+    Percept,
+    Self,
+)
 
 __all__ = [
     "CORRECTION_ID",
@@ -84,12 +92,14 @@ __all__ = [
     "LinkKind",
     "LoopClosure",
     "Map",
+    "Misfits",
     "Need",
     "Node",
     "Object",
     "ObservationColumn",
     "Observations",
     "PathColumn",
+    "PathIntegration",
     "PathSegment",
     "Percept",
     "PlaceColumn",

@@ -16,15 +16,51 @@ from cogmap.schemas.nodes.columns import POSE_COLUMNS, SelfColumn, check_matrix
 from cogmap.schemas.nodes.ids import ROOT_MAP
 
 
+class PathIntegration(msgspec.Struct, kw_only=True, frozen=True):
+    """The pose by path integration alone, and its variance since the start, of the distance and of
+    the heading.
+    """
+
+    x_m: Finite = 0.0
+    y_m: Finite = 0.0
+    heading_rad: Finite = 0.0
+    variance_m2: Spread = 0.0
+    variance_rad2: Spread = 0.0
+
+    def pose(self) -> npt.NDArray[np.float64]:
+        """(3,): x, y and heading."""
+        return np.array([self.x_m, self.y_m, self.heading_rad])
+
+    def variances(self) -> npt.NDArray[np.float64]:
+        """(2,): in m^2 and rad^2."""
+        return np.array([self.variance_m2, self.variance_rad2])
+
+
+class Misfits(msgspec.Struct, kw_only=True, frozen=True):
+    """Views that did not fit the map.
+
+    `count` is the number of views in a row in which nothing fitted, `label` the landmark that did
+    not fit first, and `is_lost` states that another did not fit since. `last_ns` and `last_fit_ns`
+    are the stamps of the last misfit and of the last view that fitted. `not_elsewhere_ns` is the
+    stamp at which what did not fit was found to fit nowhere else on the map together either,
+    `found_ns` that at which the agent was found where it cannot have moved to.
+    """
+
+    count: Count = 0
+    label: str = ""
+    is_lost: bool = False
+    last_ns: Stamp = 0
+    last_fit_ns: Stamp = 0
+    not_elsewhere_ns: Stamp = NEVER_NS
+    found_ns: Stamp = NEVER_NS
+
+
 class Self(GraphNode, kw_only=True, frozen=True, tag="self"):
-    """The agent: samples of its pose (paper §5.4), and what localization keeps between cycles.
+    """The agent: the estimate of its pose (paper §5.4), path integration alone, and misfits.
 
     `samples`: float64 (n, 3) or (n, 7), see SelfColumn. The pose is their mean. `kept_share` is the
-    share of the samples that rejection kept. `misfit_count` is the number of views in a row in
-    which nothing fitted, `first_misfit` the landmark that did not fit first, and `is_lost` whether
-    another did not fit since. `not_elsewhere_ns` is the stamp at which what did not fit was found
-    to fit nowhere else on the map together either, `found_ns` that at which the agent was found
-    where it cannot have moved to. `stationary_since_ns` is NEVER_NS while the agent moves.
+    share of the samples that rejection kept. `stationary_since_ns` is NEVER_NS while the agent
+    moves.
     """
 
     map: Name = ROOT_MAP
@@ -36,22 +72,12 @@ class Self(GraphNode, kw_only=True, frozen=True, tag="self"):
     y_sd_m: Spread = 0.0
     heading_sd_rad: Spread = 0.0
     kept_share: Unit = 1.0
-    misfit_count: Count = 0
-    first_misfit: str = ""
-    is_lost: bool = False
-    last_misfit_ns: Stamp = 0
-    last_fit_ns: Stamp = 0
-    not_elsewhere_ns: Stamp = NEVER_NS
-    found_ns: Stamp = NEVER_NS
     stationary_since_ns: Stamp = NEVER_NS
     speed_gain: Finite = 0.0
     turn_gain: Finite = 0.0
     range_gain: Finite = 0.0
-    odometry_x_m: Finite = 0.0
-    odometry_y_m: Finite = 0.0
-    odometry_heading_rad: Finite = 0.0
-    odometry_variance_m2: Spread = 0.0
-    odometry_variance_rad2: Spread = 0.0
+    odometry: PathIntegration = PathIntegration()
+    misfits: Misfits = Misfits()
     samples: Matrix
 
     def __post_init__(self) -> None:

@@ -2,7 +2,7 @@
 
 A behaviour is as active as the broadcast has made its scheme, and by what it has gathered. With
 each broadcast it gathers from its context, from those whose results it needs or brings about, and
-loses to those whose context it would undo. Patterns are the same where they are spelled the same.
+loses to those whose context it would undo. Patterns are the same if they are spelled the same.
 """
 
 from __future__ import annotations
@@ -10,8 +10,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cogmap.schemas.cognition import Behaviour
-from cogmap.services.action.config import Config
 from cogmap.services.action.selection import Level
+
+# LIDA's published defaults, as shares of an activation.
+BROADCAST_EXCITATION = 0.05
+"""What a behaviour gathers from a broadcast of its context."""
+SUCCESSOR_EXCITATION = 0.04
+"""What a behaviour passes to those whose missing context its results are."""
+PREDECESSOR_EXCITATION = 0.1
+"""What a behaviour whose context is missing passes to those that bring it about."""
+CONFLICTOR_INHIBITION = 0.04
+"""By what a behaviour inhibits those that undo its context."""
+DECAY = 0.1
+"""What is lost of what was gathered, with each broadcast. LIDA: in each tick; but behaviours gather
+once in a broadcast, and by the tick nothing would last to the next.
+"""
 
 Key = tuple[str, tuple[tuple[str, str], ...]]
 
@@ -19,8 +32,7 @@ Key = tuple[str, tuple[tuple[str, str], ...]]
 class BehaviourNet:
     """The activation that each behaviour has gathered, from broadcast to broadcast."""
 
-    def __init__(self, config: Config) -> None:
-        self._config = config
+    def __init__(self) -> None:
         self._gathered: dict[Key, float] = {}
 
     def restore(self, behaviours: Sequence[Behaviour]) -> None:
@@ -37,63 +49,52 @@ class BehaviourNet:
         """How active each of the behaviours of a broadcast is, in their order.
 
         All pass activation at once, by what they had before. One that is not instantiated is as
-        active, to the others, as its results are wanted.
+        active, to the others, as its results are wanted: by their mean |salience|.
         """
-        before = [self._before(behaviour) for behaviour in behaviours]
+        before = []
+        for behaviour in behaviours:
+            had = self._gathered.get(_key(behaviour), 0.0)
+            left = max(0.0, had - DECAY) if had > 0.0 else min(0.0, had + DECAY)
+            own = behaviour.activation
+            if behaviour.rejection:
+                saliences = [abs(salience) for salience in behaviour.adding.values()]
+                own = sum(saliences) / max(1, len(saliences))
+            before.append(Level(behaviour, own + left, left))
+
         self._gathered = {}
         levels = []
         for level in before:
-            gathered = level.gathered + self._from_broadcast(level.behaviour)
-            gathered += sum(self._passed(other, level) for other in before if other is not level)
+            context = level.behaviour.context.values()
+            gathered = level.gathered
+            gathered += BROADCAST_EXCITATION * (sum(context) / max(1, len(context)))
+            gathered += sum(passed(other, level) for other in before if other is not level)
             self._gathered[_key(level.behaviour)] = gathered
             own = level.activation - level.gathered
             levels.append(Level(level.behaviour, own + gathered, gathered))
 
         return levels
 
-    def _before(self, behaviour: Behaviour) -> Level:
-        """A behaviour as it enters: with what is left of what it had gathered."""
-        had = self._gathered.get(_key(behaviour), 0.0)
-        decay = self._config.net_decay
-        left = max(0.0, had - decay) if had > 0.0 else min(0.0, had + decay)
-        own = _wanted(behaviour) if behaviour.rejection else behaviour.activation
-        return Level(behaviour, own + left, left)
 
-    def _from_broadcast(self, behaviour: Behaviour) -> float:
-        context = behaviour.context.values()
-        mean = sum(context) / max(1, len(context))
-        return self._config.broadcast_excitation * mean
+def passed(source: Level, target: Level) -> float:
+    """The activation that one behaviour passes to another, below 0 if it inhibits it.
 
-    def _passed(self, source: Level, target: Level) -> float:
-        """The activation that one behaviour passes to another, below 0 where it inhibits it."""
-        activation = max(0.0, source.activation)
-        config = self._config
-        share = -config.conflictor_inhibition * self._conflict(source, target)
-        if source.is_executable:
-            share += config.successor_excitation * _enabled(source.behaviour, target.behaviour)
-        else:
-            share += config.predecessor_excitation * _enabled(target.behaviour, source.behaviour)
-        return share * activation
+    Of two that would undo each other's context only the more active one inhibits.
+    """
+    undone = _undone(target.behaviour, source.behaviour)
+    is_mutual = _undone(source.behaviour, target.behaviour) > 0.0
+    if is_mutual and source.activation < target.activation:
+        undone = 0.0
 
-    def _conflict(self, source: Level, target: Level) -> float:
-        """The share of the source's context that the target undoes. Of two that would undo each
-        other's, only the more active one inhibits.
-        """
-        undone = _undone(target.behaviour, source.behaviour)
-        is_mutual = _undone(source.behaviour, target.behaviour) > 0.0
-        if is_mutual and source.activation < target.activation:
-            return 0.0
-        return undone
+    share = -CONFLICTOR_INHIBITION * undone
+    if source.is_executable:
+        share += SUCCESSOR_EXCITATION * _enabled(source.behaviour, target.behaviour)
+    else:
+        share += PREDECESSOR_EXCITATION * _enabled(target.behaviour, source.behaviour)
+    return share * max(0.0, source.activation)
 
 
 def _key(behaviour: Behaviour) -> Key:
     return behaviour.scheme, tuple(sorted(behaviour.bindings.items()))
-
-
-def _wanted(behaviour: Behaviour) -> float:
-    """The mean |salience| of what a behaviour brings about."""
-    saliences = [abs(salience) for salience in behaviour.adding.values()]
-    return sum(saliences) / max(1, len(saliences))
 
 
 def _enabled(first: Behaviour, then: Behaviour) -> float:

@@ -1,4 +1,4 @@
-"""The settings of action selection: LIDA's published defaults, where none says otherwise."""
+"""The settings of action selection: LIDA's published defaults, unless one says otherwise."""
 
 from __future__ import annotations
 
@@ -22,47 +22,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         ),
     ] = "behaviour_net"
     selection_threshold: Annotated[
-        Share, msgspec.Meta(description="Activation that a behaviour needs to be chosen, 0 to 1.")
+        Share, msgspec.Meta(description="Activation that a behaviour needs to be chosen")
     ] = 0.9
     threshold_fall: Annotated[
         Share,
-        msgspec.Meta(
-            description="Fall of that threshold with each attempt that chooses none, 0 to 1."
-        ),
-    ] = 0.1
-    broadcast_excitation: Annotated[
-        Share,
-        msgspec.Meta(
-            description="Share of the activation of its context that a behaviour gathers from a "
-            "broadcast, 0 to 1."
-        ),
-    ] = 0.05
-    successor_excitation: Annotated[
-        Share,
-        msgspec.Meta(
-            description="Share of its activation that a behaviour passes to those for which its "
-            "results are the missing part of the context, 0 to 1."
-        ),
-    ] = 0.04
-    predecessor_excitation: Annotated[
-        Share,
-        msgspec.Meta(
-            description="Share of its activation that a behaviour whose context is missing passes "
-            "to those that bring it about, 0 to 1."
-        ),
-    ] = 0.1
-    conflictor_inhibition: Annotated[
-        Share,
-        msgspec.Meta(
-            description="Share of its activation by which a behaviour inhibits those that undo its "
-            "context, 0 to 1."
-        ),
-    ] = 0.04
-    net_decay: Annotated[
-        Share,
-        msgspec.Meta(
-            description="What a behaviour loses with each broadcast of the activation that it has "
-            "gathered in the net, 0 to 1. LIDA: 0.1 in a tick; here with each broadcast, because "
-            "behaviours gather once in each: by the tick nothing would last to the next."
-        ),
+        msgspec.Meta(description="Fall of that threshold with each attempt that chooses none"),
     ] = 0.1

@@ -22,7 +22,7 @@ class ActionModule:
     def __init__(self, config: Config) -> None:
         selector: Selector = MostActive()
         if config.selector == "behaviour_net":
-            selector = BehaviourNet(config)
+            selector = BehaviourNet()
         threshold = config.selection_threshold
         self._selection = ActionSelection(selector, threshold, config.threshold_fall)
         self._last: Action | None = None

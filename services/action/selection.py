@@ -25,6 +25,11 @@ class Level(NamedTuple):
         """Whether the scheme is instantiated."""
         return not self.behaviour.rejection
 
+    @property
+    def rank(self) -> tuple[float, float, str]:
+        """The order in which behaviours are chosen."""
+        return -self.activation, -self.behaviour.reliability, self.behaviour.scheme
+
     def as_considered(self) -> Behaviour:
         """The behaviour with this activation, for the message."""
         activation = min(1.0, max(0.0, self.activation)) if self.is_executable else 0.0
@@ -91,7 +96,7 @@ class ActionSelection:
         """The behaviour for a broadcast, by those of it that are instantiated."""
         levels = self._selector.levels(behaviours)
         executable = [level for level in levels if level.is_executable]
-        best = min(executable, key=_rank, default=None)
+        best = min(executable, key=lambda level: level.rank, default=None)
         if best is None or best.activation < self._threshold:
             self._threshold = max(0.0, self._threshold - self._fall)
             return Selection(None, _rejected(levels, Rejection.BELOW_THRESHOLD), self._threshold)
@@ -100,12 +105,6 @@ class ActionSelection:
         self._selector.on_chosen(best.behaviour)
         considered = _rejected(levels, Rejection.LESS_ACTIVE, best)
         return Selection(best.as_considered(), considered, self._threshold)
-
-
-def _rank(level: Level) -> tuple[float, float, str]:
-    """The order in which behaviours are chosen."""
-    behaviour = level.behaviour
-    return -level.activation, -behaviour.reliability, behaviour.scheme
 
 
 def _rejected(

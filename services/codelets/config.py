@@ -14,7 +14,6 @@ SECTION = "codelets"
 Gain = Annotated[float, Meta(ge=0, le=1)]
 Seconds = Annotated[float, Meta(gt=0, le=1e9)]
 Positive = Annotated[float, Meta(gt=0, le=100)]
-Share = Annotated[float, Meta(ge=0, le=1)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -43,10 +42,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         int,
         Meta(description="samples of each landmark's position, 10 to 10000", ge=10, le=10_000),
     ] = 200
-    outlier_share: Annotated[
-        Share,
-        Meta(description="share of percepts that may be of another landmark, 0 to 1"),
-    ] = 1e-3
     correlated_views: Annotated[
         float,
         Meta(
@@ -70,23 +65,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "deviation in m, above 0, at most 10000"
         ),
     ] = 0.03
-    gate: Annotated[
-        float,
-        Meta(
-            description="a percept further from what a sample predicts does not fit it, in "
-            "standard deviations, above 0, at most 100",
-            gt=0,
-            le=100,
-        ),
-    ] = 4.0
-    misses: Annotated[
-        int,
-        Meta(
-            description="successive misfits after which a landmark is placed anew, 1 to 10000",
-            ge=1,
-            le=10_000,
-        ),
-    ] = 8
     speed_gain_sd: Annotated[
         Gain,
         Meta(description="standard deviation of the gain error of speed, a share, 0 to 1"),
@@ -99,57 +77,14 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Gain,
         Meta(description="standard deviation of the drift of heading, rad per m, 0 to 1"),
     ] = 0.0
-    motion_bias_time_s: Annotated[
-        Seconds,
-        Meta(
-            description="correlation time of the errors of speed, turn rate and drift, in s, "
-            "above 0, at most 1e9"
-        ),
-    ] = 30.0
     range_gain_sd: Annotated[
         Gain,
         Meta(description="standard deviation of the gain error of range, a share, 0 to 1"),
     ] = 0.0
-    range_bias_time_s: Annotated[
-        Seconds,
-        Meta(description="correlation time of the gain error of range, in s, above 0, at most 1e9"),
-    ] = 300.0
-    misfits_to_relocalize: Annotated[
-        int,
-        Meta(
-            description="successive views that fit no sample, of two landmarks or more, after "
-            "which the agent relocalizes, 2 to 10000",
-            ge=2,
-            le=10_000,
-        ),
-    ] = 8
-    farthest_m: Annotated[
-        PositiveMetres,
-        Meta(
-            description="distance up to which a landmark seen by its bearing alone may stand, in "
-            "m, above 0, at most 10000"
-        ),
-    ] = 50.0
     path_spacing_m: Annotated[
         PositiveMetres,
         Meta(description="distance between places of the path, in m, above 0, at most 10000"),
     ] = 1.0
-    boundary_reach_m: Annotated[
-        float,
-        Meta(
-            description="distance up to which links are cut or freed by what is seen, in m, above "
-            "0, at most 100",
-            gt=0,
-            le=100,
-        ),
-    ] = 25.0
-    range_sd_share: Annotated[
-        Gain,
-        Meta(
-            description="standard deviation of a distance seen over the distance, by which road, "
-            "boundaries and obstacles far away count less, 0 to 1"
-        ),
-    ] = 0.03
     revisit_s: Annotated[
         Seconds,
         Meta(
@@ -198,25 +133,14 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "known does not have all its map turned by what it learns of that"
         ),
     ] = "start"
-    landmark_sides: Annotated[
-        int,
+    landmarks: Annotated[
+        Literal["buildings", "points"],
         Meta(
-            description="sides of a landmark, by the direction in which it is seen, whose views "
-            "share an error: each is a landmark of its own for map correction, 1 to 360; 1: views "
-            "from all directions have the same error",
-            ge=1,
-            le=360,
+            description="what landmarks are for map correction. buildings: successive sightings "
+            "of one of their sides err alike, and each side errs by itself. points: all sightings "
+            "err independently"
         ),
-    ] = 16
-    correlated_sightings: Annotated[
-        float,
-        Meta(
-            description="successive sightings of a landmark along the path whose errors are "
-            "alike, so that together they count as one in map correction, 1 to 1000",
-            ge=1,
-            le=1000,
-        ),
-    ] = 5.0
+    ] = "buildings"
     place_match_sd_m: Annotated[
         PositiveMetres,
         Meta(
@@ -233,15 +157,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             le=3.2,
         ),
     ] = 0.2
-    false_closure: Annotated[
-        float,
-        Meta(
-            description="a loop closure is rejected if a true one would misfit as much with a "
-            "smaller probability, between 0 and 1",
-            gt=0,
-            lt=1,
-        ),
-    ] = 1e-3
     sparse_after_s: Annotated[
         Seconds,
         Meta(
@@ -250,26 +165,3 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "can be taken back"
         ),
     ] = 300.0
-    waiting_misfit: Annotated[
-        Positive,
-        Meta(
-            description="misfit of a new loop closure up to which the path explains it: its "
-            "squared distance, in variances, over that at which a closure is rejected, above 0, "
-            "at most 100"
-        ),
-    ] = 0.1
-    waiting_share: Annotated[
-        Share,
-        Meta(
-            description="share of the new loop closures that the path does not explain, three at "
-            "least, from which on it is corrected, once part of it is sparse; below, a correction "
-            "would change little, and waits, 0 to 1; 0: none waits"
-        ),
-    ] = 0.1
-    synapse_decay_per_m: Annotated[
-        Positive,
-        Meta(
-            description="decay of the synapse between two place cells with the distance of their "
-            "fields, per m, above 0, at most 100"
-        ),
-    ] = 0.2

@@ -1,78 +1,82 @@
 """The one table of codelets: ours, a row each, and those that other packages declare.
 
 A package declares its own by an entry point of the group `cogmap.codelets`, whose object is a
-Codelet.
+Codelet. Ours are imported when they are to run: whoever configures them needs their settings alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from typing import NamedTuple
+
+import msgspec
 
 from cogmap.errors import ConfigError
 from cogmap.runtime import config
 from cogmap.runtime.codelet import ENTRY_POINTS, Codelet, ConfiguredCodelet
-from cogmap.services.codelets.attention import (
-    danger,
-    episode,
-    expectation,
-    goal,
-    need,
-    novelty,
-    place_lost,
-    whereabouts,
-)
-from cogmap.services.codelets.correction import (
-    apply_correction,
-    join_map,
-    map_correction,
-    sparse_path,
-)
-from cogmap.services.codelets.localization import landmarks, localization, object_place
-from cogmap.services.codelets.mapping import (
-    boundary,
-    charging_place,
-    loop_detection,
-    path,
-    road_place,
-)
-from cogmap.services.codelets.planning import route_plan
-from cogmap.services.codelets.sub_maps import coarse_places, map_structure, sub_map_places
 
-CODELETS: tuple[Codelet, ...] = (
-    apply_correction.CODELET,
-    join_map.CODELET,
-    sparse_path.CODELET,
-    localization.CODELET,
-    object_place.CODELET,
-    charging_place.CODELET,
-    landmarks.CODELET,
-    road_place.CODELET,
-    boundary.CODELET,
-    path.CODELET,
-    loop_detection.CODELET,
-    map_correction.CODELET,
-    map_structure.CODELET,
-    coarse_places.CODELET,
-    sub_map_places.CODELET,
-    route_plan.CODELET,
-    whereabouts.CODELET,
-    novelty.CODELET,
-    expectation.CODELET,
-    goal.CODELET,
-    need.CODELET,
-    danger.CODELET,
-    place_lost.CODELET,
-    episode.CODELET,
+
+class Row(NamedTuple):
+    """The module of a codelet, whose CODELET it is, and if it has settings, the module that has
+    them: their SECTION and their type, Config.
+    """
+
+    module: str
+    settings: str = ""
+
+
+ROWS = (
+    Row("correction.apply_correction"),
+    Row("correction.join_map"),
+    Row("correction.sparse_path", "config"),
+    Row("localization.localization", "config"),
+    Row("localization.object_place", "config"),
+    Row("mapping.charging_place"),
+    Row("localization.landmarks", "config"),
+    Row("mapping.road_place"),
+    Row("mapping.boundary"),
+    Row("mapping.path", "config"),
+    Row("mapping.loop_detection", "config"),
+    Row("correction.map_correction", "config"),
+    Row("sub_maps.map_structure", "sub_maps.config"),
+    Row("sub_maps.coarse_places"),
+    Row("sub_maps.sub_map_places"),
+    Row("planning.route_plan", "planning.config"),
+    Row("attention.whereabouts"),
+    Row("attention.novelty", "attention.novelty"),
+    Row("attention.expectation", "attention.expectation"),
+    Row("attention.goal"),
+    Row("attention.need", "attention.need"),
+    Row("attention.danger"),
+    Row("attention.place_lost"),
+    Row("attention.episode"),
 )
+
+
+@cache
+def own_codelets() -> tuple[Codelet, ...]:
+    """Our codelets, in the order of ROWS."""
+    modules = [import_module(f"{__package__}.{row.module}") for row in ROWS]
+    return tuple(module.CODELET for module in modules)
+
+
+@cache
+def own_settings() -> dict[str, type[msgspec.Struct]]:
+    """The types of our codelets' settings, by section."""
+    named = {row.settings for row in ROWS if row.settings}
+    modules = [import_module(f"{__package__}.{name}") for name in sorted(named)]
+    return {module.SECTION: module.Config for module in modules}
 
 
 def all_codelets() -> tuple[Codelet, ...]:
     """Our codelets, then those of other packages, by name.
 
-    Raises ConfigError where an entry point is no codelet, or a name is taken.
+    Raises ConfigError if an entry point is no codelet, or a name is taken.
     """
-    codelets = list(CODELETS)
+    codelets = list(own_codelets())
     names = {codelet.name for codelet in codelets}
     points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
 
@@ -88,24 +92,21 @@ def all_codelets() -> tuple[Codelet, ...]:
 
 
 def _declared(point: EntryPoint) -> Codelet:
-    """The codelet that an entry point names. Raises ConfigError where it names none."""
-    loaded = _loaded(point)
-    if not isinstance(loaded, Codelet):
-        raise ConfigError(f"entry point {point.name} = {point.value} is no Codelet")
-
-    return loaded
-
-
-def _loaded(point: EntryPoint) -> object:
-    """What an entry point names. Raises ConfigError where it cannot be imported."""
+    """The codelet that an entry point names. Raises ConfigError if it names none, or cannot be
+    imported.
+    """
     try:
-        return point.load()
+        loaded = point.load()
     except Exception as error:  # another package's code may raise anything as it is imported
         reason = f"{type(error).__name__}: {error}"
         raise ConfigError(
             f"entry point {point.name} = {point.value} cannot be imported ({reason}): "
             "mend or uninstall its package"
         ) from error
+
+    if not isinstance(loaded, Codelet):
+        raise ConfigError(f"entry point {point.name} = {point.value} is no Codelet")
+    return loaded
 
 
 def configured(

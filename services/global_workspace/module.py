@@ -22,7 +22,12 @@ from cogmap.schemas.cognition import (
     Silence,
     Trigger,
 )
-from cogmap.services.global_workspace.config import Config
+from cogmap.services.global_workspace.config import (
+    NO_NEW_COALITION_TICKS,
+    TICK_MS,
+    TICKS_PER_DECAY,
+    Config,
+)
 
 __all__ = ["Config", "GlobalWorkspace", "build"]
 
@@ -61,46 +66,56 @@ class GlobalWorkspace:
     def on_coalitions(self, coalitions: Coalitions) -> list[Message]:
         """Let a cycle's coalitions compete: a competition, after a broadcast if one was triggered.
 
-        Raises MessageError where they were received before: a task that one worker lost is answered
+        Raises MessageError if they were received before: a task that one worker lost is answered
         by two.
         """
-        self._check_new(coalitions)
-        losers = self._decay(max(0, coalitions.stamp_ns - self._now_ns))
-        self._now_ns = max(self._now_ns, coalitions.stamp_ns)
-        losers += self._enter(coalitions)
-
-        silence = self._silence()
-        trigger = Trigger.NONE if silence else self._trigger()
-        winner = self._pop_winner() if trigger else None
-        competition = Competition(
-            stamp_ns=coalitions.stamp_ns,
-            cycle=coalitions.cycle,
-            contenders=self._report(winner, losers),
-            trigger=trigger,
-            silence=silence if silence or trigger else Silence.NO_TRIGGER,
-        )
-        if winner is None:
-            return [competition]
-
-        broadcast = Broadcast(
-            stamp_ns=coalitions.stamp_ns,
-            cycle=coalitions.cycle,
-            trigger=trigger,
-            coalition=winner.coalition,
-        )
-
-        return [broadcast, competition]
-
-    def _check_new(self, coalitions: Coalitions) -> None:
         key = (coalitions.cycle, coalitions.stamp_ns)
         if key in self._received:
             raise MessageError(f"the coalitions of cycle {coalitions.cycle} came twice")
-
         self._received.append(key)
+
+        contenders = self._decay(max(0, coalitions.stamp_ns - self._now_ns))
+        self._now_ns = max(self._now_ns, coalitions.stamp_ns)
+        for coalition in coalitions.coalitions:
+            codelet = coalition.codelet
+            before = self._candidates.get(codelet)
+            if before is None:
+                self._new_ns = self._now_ns
+            else:
+                contenders.append(before.with_fate(Fate.DISPLACED))
+            name = coalition.id or f"{codelet}/{coalitions.cycle}"
+            self._candidates[codelet] = Candidate(name, coalition, coalition.activation)
+
+        silence, trigger = self._decide()
+        published: list[Message] = []
+        if trigger:
+            # The most active wins, of equals the first by its codelet's name.
+            codelets = sorted(self._candidates)
+            best = max(codelets, key=lambda codelet: self._candidates[codelet].activation)
+            winner = self._candidates.pop(best)
+            contenders.append(winner.with_fate(Fate.WON))
+            self._broadcast_ns = self._now_ns
+            broadcast = Broadcast(
+                stamp_ns=coalitions.stamp_ns,
+                cycle=coalitions.cycle,
+                trigger=trigger,
+                coalition=winner.coalition,
+            )
+            published.append(broadcast)
+
+        contenders += [each.with_fate(Fate.WAITING) for each in self._candidates.values()]
+        competition = Competition(
+            stamp_ns=coalitions.stamp_ns,
+            cycle=coalitions.cycle,
+            contenders=sorted(contenders, key=lambda each: (each.codelet, each.id)),
+            trigger=trigger,
+            silence=silence,
+        )
+        return [*published, competition]
 
     def _decay(self, passed_ns: int) -> list[Contender]:
         """Take off activation for the time that passed; those that have none left."""
-        lost = self._config.decay * self._ticks(passed_ns) / self._config.ticks_per_decay
+        lost = self._config.decay * _ticks(passed_ns) / TICKS_PER_DECAY
         decayed = []
         for codelet, candidate in list(self._candidates.items()):
             candidate.activation -= lost
@@ -110,71 +125,34 @@ class GlobalWorkspace:
 
         return decayed
 
-    def _enter(self, coalitions: Coalitions) -> list[Contender]:
-        """Add the cycle's coalitions; those of the same codelets that they replace."""
-        displaced = []
-        for coalition in coalitions.coalitions:
-            codelet = coalition.codelet
-            before = self._candidates.get(codelet)
-            if before is None:
-                self._new_ns = self._now_ns
-            else:
-                displaced.append(before.with_fate(Fate.DISPLACED))
-            name = coalition.id or f"{codelet}/{coalitions.cycle}"
-            self._candidates[codelet] = Candidate(name, coalition, coalition.activation)
-
-        return displaced
-
-    def _silence(self) -> Silence:
-        """Why no trigger may fire now; NONE where one may."""
-        if not self._candidates:
-            return Silence.NO_COALITION
-        if self._silent_ticks() < self._config.refractory_ticks:
-            return Silence.REFRACTORY
-        return Silence.NONE
-
-    def _trigger(self) -> Trigger:
-        """The first trigger whose condition is met."""
+    def _decide(self) -> tuple[Silence, Trigger]:
+        """The reason why nothing is broadcast now, or the first trigger whose condition is met."""
         config = self._config
+        if not self._candidates:
+            return Silence.NO_COALITION, Trigger.NONE
+
+        silent_ticks = math.inf
+        if self._broadcast_ns is not None:
+            silent_ticks = _ticks(self._now_ns - self._broadcast_ns)
+        if silent_ticks < config.refractory_ticks:
+            return Silence.REFRACTORY, Trigger.NONE
+
         activations = [candidate.activation for candidate in self._candidates.values()]
-        silent_ticks = self._silent_ticks()
-        old_ticks = self._ticks(self._now_ns - self._new_ns)
+        old_ticks = _ticks(self._now_ns - self._new_ns)
         conditions = {
             Trigger.ONE_COALITION: max(activations) > config.coalition_above,
             Trigger.AGGREGATE: sum(activations) > config.aggregate_above,
             Trigger.NO_BROADCAST: silent_ticks >= config.no_broadcast_ticks,
-            Trigger.NO_NEW_COALITION: old_ticks >= config.no_new_coalition_ticks,
+            Trigger.NO_NEW_COALITION: old_ticks >= NO_NEW_COALITION_TICKS,
         }
-        met = [trigger for trigger, is_met in conditions.items() if is_met]
+        for trigger, is_met in conditions.items():
+            if is_met:
+                return Silence.NONE, trigger
+        return Silence.NO_TRIGGER, Trigger.NONE
 
-        return met[0] if met else Trigger.NONE
 
-    def _pop_winner(self) -> Candidate:
-        """Take out the most active candidate, of equals the first by its codelet's name."""
-        codelets = sorted(self._candidates)
-        best = max(codelets, key=lambda codelet: self._candidates[codelet].activation)
-        self._broadcast_ns = self._now_ns
-
-        return self._candidates.pop(best)
-
-    def _report(self, winner: Candidate | None, losers: list[Contender]) -> list[Contender]:
-        """Every coalition that took part, by codelet, then id."""
-        contenders = list(losers)
-        if winner is not None:
-            contenders.append(winner.with_fate(Fate.WON))
-
-        waiting = self._candidates.values()
-        contenders += [candidate.with_fate(Fate.WAITING) for candidate in waiting]
-
-        return sorted(contenders, key=lambda each: (each.codelet, each.id))
-
-    def _silent_ticks(self) -> float:
-        if self._broadcast_ns is None:
-            return math.inf
-        return self._ticks(self._now_ns - self._broadcast_ns)
-
-    def _ticks(self, duration_ns: int) -> float:
-        return duration_ns / 1e6 / self._config.tick_ms
+def _ticks(duration_ns: int) -> float:
+    return duration_ns / 1e6 / TICK_MS
 
 
 def build(config: Config, instance: str) -> Module:

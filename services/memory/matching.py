@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import motion_onto, rotate, transform_from, wrap_angle
 
 NEAREST_PAIR_M = 6.0
@@ -46,7 +46,7 @@ class Match(NamedTuple):
 
 
 def best_matches(here: Landmarks, there: Landmarks, within_m: float) -> tuple[Match, int] | None:
-    """The match of most landmarks, and how many the best one at any other pose has; None where no
+    """The match of most landmarks, and how many the best one at any other pose has; None if no
     two landmarks of each are alike.
     """
     poses = _hypotheses(here, there, within_m)
@@ -54,10 +54,24 @@ def best_matches(here: Landmarks, there: Landmarks, within_m: float) -> tuple[Ma
         return None
 
     counts = _counts(poses, here, there, within_m)
-    best = _refined(poses[counts.argmax()], here, there, within_m)
+    pose = poses[counts.argmax()]
+    match = Match(pose, _belonging(pose, here, there, within_m))
+    for _ in range(REFINEMENTS):
+        is_matched = match.there != NOWHERE
+        if is_matched.sum() < 2:
+            break
 
-    is_other = _are_apart(poses, best.pose, here)
-    return best, int(counts[is_other].max(initial=0))
+        # It is moved to where all that belong together fit best.
+        fitted = motion_onto(here.at_m[is_matched], there.at_m[match.there[is_matched]])
+        match = Match(fitted, _belonging(fitted, here, there, within_m))
+
+    # Another pose places the middle of what is here elsewhere, or turns it.
+    middle_m = here.at_m.mean(axis=0)
+    moved_m = rotate(np.broadcast_to(middle_m, (len(poses), 2)), poses[:, 2]) + poses[:, :2]
+    away_m = np.hypot(*(moved_m - transform_from(match.pose, middle_m[None])).T)
+    turned_rad = np.abs(wrap_angle(poses[:, 2] - match.pose[2]))
+    is_other = (away_m > SAME_POSE_M) | (turned_rad > SAME_POSE_RAD)
+    return match, int(counts[is_other].max(initial=0))
 
 
 def _hypotheses(here: Landmarks, there: Landmarks, within_m: float) -> Floats:
@@ -75,7 +89,12 @@ def _hypotheses(here: Landmarks, there: Landmarks, within_m: float) -> Floats:
         farthest = np.argsort(-apart_here_m[one], kind="stable")[:MAX_HYPOTHESES]
         one, other = one[farthest], other[farthest]
 
-    return _poses(here.at_m[pairs_here[one]], there.at_m[pairs_there[other]])
+    # The middles of pairs are moved onto each other, and turned to one direction.
+    here_m = here.at_m[pairs_here[one]]
+    there_m = there.at_m[pairs_there[other]]
+    turn_rad = _direction(there_m) - _direction(here_m)
+    shift_m = there_m.mean(axis=1) - rotate(here_m.mean(axis=1), turn_rad)
+    return np.column_stack([shift_m, wrap_angle(turn_rad)])
 
 
 def _codes(landmarks: Landmarks, pairs: Indices, looks: int) -> Indices:
@@ -95,21 +114,10 @@ def _pairs(landmarks: Landmarks) -> tuple[Indices, Floats]:
     return np.argwhere(is_pair), apart_m[is_pair]
 
 
-def _poses(here_m: Floats, there_m: Floats) -> Floats:
-    """(h, 3): poses that move the middles of (h, 2, 2) pairs onto each other, and turn them to one
-    direction.
-    """
-    along_here_m = here_m[:, 1] - here_m[:, 0]
-    along_there_m = there_m[:, 1] - there_m[:, 0]
-    turn_rad = _direction(along_there_m) - _direction(along_here_m)
-
-    turned_m = rotate(here_m.mean(axis=1), turn_rad)
-    shift_m = there_m.mean(axis=1) - turned_m
-    return np.column_stack([shift_m, wrap_angle(turn_rad)])
-
-
-def _direction(vectors: Floats) -> Floats:
-    return np.arctan2(vectors[:, 1], vectors[:, 0])
+def _direction(pairs_m: Floats) -> Floats:
+    """(h,): the direction from the first to the second of (h, 2, 2) pairs."""
+    along_m = pairs_m[:, 1] - pairs_m[:, 0]
+    return np.arctan2(along_m[:, 1], along_m[:, 0])
 
 
 def _counts(poses: Floats, here: Landmarks, there: Landmarks, within_m: float) -> Indices:
@@ -128,20 +136,6 @@ def _counts(poses: Floats, here: Landmarks, there: Landmarks, within_m: float) -
     return counts
 
 
-def _refined(pose: Floats, here: Landmarks, there: Landmarks, within_m: float) -> Match:
-    """The match near a pose, which is moved to where all that belong together fit best."""
-    match = Match(pose, _belonging(pose, here, there, within_m))
-    for _ in range(REFINEMENTS):
-        is_matched = match.there != NOWHERE
-        if is_matched.sum() < 2:
-            break
-
-        fitted = motion_onto(here.at_m[is_matched], there.at_m[match.there[is_matched]])
-        match = Match(fitted, _belonging(fitted, here, there, within_m))
-
-    return match
-
-
 def _belonging(pose: Floats, here: Landmarks, there: Landmarks, within_m: float) -> Indices:
     """(n,): the landmark there that each landmark here belongs to by a pose, no two to one."""
     moved_m = transform_from(pose, here.at_m)
@@ -157,12 +151,3 @@ def _belonging(pose: Floats, here: Landmarks, there: Landmarks, within_m: float)
             away_m[:, nearest] = np.inf
 
     return belongs
-
-
-def _are_apart(poses: Floats, pose: Floats, here: Landmarks) -> Booleans:
-    """(h,): which poses place the middle of what is here elsewhere than `pose`, or turn it."""
-    middle_m = here.at_m.mean(axis=0)
-    moved_m = rotate(np.broadcast_to(middle_m, (len(poses), 2)), poses[:, 2]) + poses[:, :2]
-    away_m = np.hypot(*(moved_m - transform_from(pose, middle_m[None])).T)
-    turned_rad = np.abs(wrap_angle(poses[:, 2] - pose[2]))
-    return np.asarray((away_m > SAME_POSE_M) | (turned_rad > SAME_POSE_RAD))

@@ -16,11 +16,36 @@ from cogmap.schemas.memory import Restored, Stored
 from cogmap.schemas.nodes import NEVER_NS, ROOT_MAP
 from cogmap.schemas.sensing import RangeScan
 from cogmap.services.memory.config import Config
-from cogmap.services.memory.episodic.memory import EpisodicMemory
-from cogmap.services.memory.gate import LockstepGate
+from cogmap.services.memory.episodic.episodic_memory import EpisodicMemory
 from cogmap.services.memory.spatial import SpatialMemory
 
 __all__ = ["Config", "LongTermMemory", "build"]
+
+
+class CompetitionGate:
+    """Open for a cycle of lockstep once the competition of the cycle before has come, and its
+    broadcast, if there was one: what memory does then depends on nothing but what was sensed.
+    """
+
+    def __init__(self) -> None:
+        self._competition_cycle = 0
+        self._broadcast_cycle = 0
+        self._awaits_broadcast = False
+
+    def on_competition(self, competition: Competition) -> None:
+        """The global workspace has come so far."""
+        self._competition_cycle = competition.cycle
+        self._awaits_broadcast = bool(competition.trigger)
+
+    def on_broadcast(self, broadcast: Broadcast) -> None:
+        """A broadcast has come."""
+        self._broadcast_cycle = broadcast.cycle
+
+    def is_open(self, cycle: int) -> bool:
+        """Whether what the end of `cycle` leads to may be computed."""
+        is_behind = self._broadcast_cycle < self._competition_cycle
+        lacks_broadcast = self._awaits_broadcast and is_behind
+        return self._competition_cycle >= cycle - 1 and not lacks_broadcast
 
 
 class LongTermMemory:
@@ -32,7 +57,7 @@ class LongTermMemory:
         self._config = config
         self._graph = graph
         self._is_lockstep = run.lockstep
-        self._gate = LockstepGate()
+        self._gate = CompetitionGate()
         self._spatial = SpatialMemory(config, graph)
         self._episodic = EpisodicMemory(config, graph)
 

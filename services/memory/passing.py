@@ -16,7 +16,6 @@ from cogmap.geometry.polylines import distances_along
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import Object, PathColumn, look_of
-from cogmap.services.memory.config import Config
 from cogmap.services.memory.maps import RememberedMap
 
 SEGMENTS = 3
@@ -27,6 +26,17 @@ BESIDE_M = 12.0
 
 ENDS_M = 4.0
 """What is nearest to the way so near to an end of it was not passed, or only in part."""
+
+MIN_PASSED = 4
+"""Objects that a stored map must have along the way; chosen by `benchmarks memory`."""
+
+MIN_SHARE = 0.75
+"""Share of the objects of one map, where the other is known, that must stand as on it; if the match
+is wrong half of them do.
+"""
+
+MATCH_WITHIN_M = 2.5
+"""Distance within which an object stands as on a stored map."""
 
 POSITION = slice(PathColumn.X_M, PathColumn.Y_M + 1)
 
@@ -47,12 +57,12 @@ def way_of(graph: Graph, learned: Sequence[Object]) -> Way:
     return Way(np.vstack(rows)[:, POSITION], learned)
 
 
-def is_as_passed(way: Way, remembered: RememberedMap, pose: Floats, config: Config) -> bool:
+def is_as_passed(way: Way, remembered: RememberedMap, pose: Floats) -> bool:
     """Whether enough objects of a stored map are along the way, and enough of them are known here,
     the frame here having that `pose` in the map's.
     """
     along = _along(transform_from(pose, way.at_m), remembered.at_m)
-    if len(along) < config.min_passed:
+    if len(along) < MIN_PASSED:
         return False
 
     here_m = transform_from(pose, np.array([(node.x_m, node.y_m) for node in way.learned]))
@@ -62,10 +72,10 @@ def is_as_passed(way: Way, remembered: RememberedMap, pose: Floats, config: Conf
     known = 0
     for number in along.tolist():
         away_m = np.hypot(*(here_m - remembered.at_m[number]).T)
-        is_it = (away_m <= config.match_within_m) & (looks_here == looks_there[number])
+        is_it = (away_m <= MATCH_WITHIN_M) & (looks_here == looks_there[number])
         known += bool(is_it.any())
 
-    return known >= config.min_share * len(along)
+    return known >= MIN_SHARE * len(along)
 
 
 def _along(way_m: Floats, at_m: Floats) -> Indices:

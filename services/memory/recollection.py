@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.schemas.array import Matrix
-from cogmap.schemas.nodes import RECOLLECTION_ID, TILE_CELLS, PlaceColumn, Recollection
-from cogmap.services.memory.maps import RememberedMap
+from cogmap.schemas.nodes import RECOLLECTION_ID, TILE_CELLS, Recollection
 from cogmap.services.memory.recall import Recalled
 from cogmap.services.memory.storing import COLUMNS
 
@@ -16,6 +15,16 @@ def recollection(found: Recalled) -> Recollection:
     remembered = found.remembered
     assert remembered.known is not None
     x_m, y_m, heading_rad = found.pose.tolist()
+
+    # A row for each tile; columns that no tile has are left out.
+    columns = {}
+    for column in COLUMNS:
+        rows = []
+        for position in sorted(remembered.tiles):
+            values = remembered.tiles[position].get(column)
+            rows.append(np.zeros((1, TILE_CELLS)) if values is None else values.numpy())
+        if any(row.any() for row in rows):
+            columns[column] = Matrix.of(np.vstack(rows), "<f2")
 
     return Recollection(
         id=RECOLLECTION_ID,
@@ -29,21 +38,6 @@ def recollection(found: Recalled) -> Recollection:
         matched=found.matched,
         objects=remembered.known.objects,
         tiles=sorted(remembered.tiles),
-        columns=_columns(remembered),
+        columns=columns,
         sub_maps=[] if remembered.tree is None else remembered.tree.sub_maps,
     )
-
-
-def _columns(remembered: RememberedMap) -> dict[PlaceColumn, Matrix]:
-    """The columns of a map's tiles, a row each; those that no tile has are left out."""
-    columns = {}
-    for column in COLUMNS:
-        rows = []
-        for position in sorted(remembered.tiles):
-            values = remembered.tiles[position].get(column)
-            rows.append(np.zeros((1, TILE_CELLS)) if values is None else values.numpy())
-
-        if any(row.any() for row in rows):
-            columns[column] = Matrix.of(np.vstack(rows), "<f2")
-
-    return columns

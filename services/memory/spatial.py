@@ -1,4 +1,4 @@
-"""Spatial Memory: it learns the root map where that is conscious, and recalls maps that it learned
+"""Spatial Memory: it learns the root map when that is conscious, and recalls maps that it learned
 before (beyond the paper, which leaves long-term memory open).
 """
 
@@ -14,15 +14,14 @@ from cogmap.schemas.graph import Delta
 from cogmap.schemas.memory import Stored, StoredObjects, StoredRecord, StoredTile
 from cogmap.schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Object, Recollection, look_of
 from cogmap.services.memory.associations import Associations
-from cogmap.services.memory.changes import Changes
-from cogmap.services.memory.config import Config
+from cogmap.services.memory.config import MIN_SIGHTINGS, Config
 from cogmap.services.memory.maps import RememberedMap, RememberedMaps
 from cogmap.services.memory.objects.cueing import ObjectCues
 from cogmap.services.memory.objects.forgotten import ForgottenObjects
 from cogmap.services.memory.passing import way_of
 from cogmap.services.memory.recall import cues, recalled
 from cogmap.services.memory.recollection import recollection
-from cogmap.services.memory.storing import ChangedPlaces, stored_objects, stored_tree
+from cogmap.services.memory.storing import ChangedPlaces, Changes, stored_objects, stored_tree
 
 
 class SpatialMemory:
@@ -37,7 +36,7 @@ class SpatialMemory:
         self._maps = RememberedMaps()
         self._name = ""
         self._changed = ChangedPlaces()
-        self._forgotten = ForgottenObjects(config, graph)
+        self._forgotten = ForgottenObjects(graph)
         self._cues = ObjectCues(config, graph)
         self._objects: list[StoredRecord] = []
         self._tree: list[StoredRecord] = []
@@ -119,7 +118,7 @@ class SpatialMemory:
         self._cued = labels
         others = self._compared(here)
         way = way_of(self._graph, learned)
-        found = recalled(here, way, others, self._graph.cell_m(ROOT_MAP), self._config)
+        found = recalled(here, way, others, self._graph.cell_m(ROOT_MAP))
         return None if found is None else recollection(found)
 
     def returning(self, cycle: int) -> list[Object]:
@@ -166,7 +165,7 @@ class SpatialMemory:
         """The objects of the root map that were seen often enough to be learned."""
         learned = []
         for node in self._graph.of_kind(Object):
-            if node.map == ROOT_MAP and node.sightings >= self._config.min_sightings:
+            if node.map == ROOT_MAP and node.sightings >= MIN_SIGHTINGS:
                 learned.append(node)
 
         return learned

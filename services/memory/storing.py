@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from cogmap.graph.places import Tile
 from cogmap.graph.tiles import tiles_of
 from cogmap.graph.window import EVIDENCE_COLUMNS
 from cogmap.schemas.array import Matrix
@@ -29,6 +29,13 @@ COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *EVIDENCE_COLUMNS)
 """Of place nodes; the weights of links follow from their evidence."""
 
 Position = tuple[int, int]
+
+
+class Changes(NamedTuple):
+    """Records that are new or changed, and the keys of those that are no more."""
+
+    records: list[StoredRecord]
+    forgotten: list[str]
 
 
 class ChangedPlaces:
@@ -56,22 +63,18 @@ class ChangedPlaces:
         records = []
         for x, y in sorted(self._changed):
             tile = graph.places.tiles.get((ROOT_MAP, x, y))
-            if tile is not None:
-                records.append(StoredTile(map=name, x=x, y=y, columns=_columns(tile)))
+            if tile is None:
+                continue
+
+            columns = {}
+            for column in COLUMNS:
+                values = tile.columns.get(column)
+                if values is not None:
+                    columns[column] = Matrix.of(values.reshape(1, TILE_CELLS), "<f2")
+            records.append(StoredTile(map=name, x=x, y=y, columns=columns))
 
         self._changed.clear()
         return records
-
-
-def _columns(tile: Tile) -> dict[PlaceColumn, Matrix]:
-    """The columns of a tile that were written."""
-    columns = {}
-    for column in COLUMNS:
-        values = tile.columns.get(column)
-        if values is not None:
-            columns[column] = Matrix.of(values.reshape(1, TILE_CELLS), "<f2")
-
-    return columns
 
 
 def stored_objects(name: str, objects: Iterable[Object], graph: Graph) -> list[StoredRecord]:
@@ -118,20 +121,17 @@ def stored_tree(name: str, objects: Iterable[Object], graph: Graph) -> list[Stor
         number = map_number(identifier)
         node = graph.get(Map, identifier)
         if number and node is not None and node.parent == ROOT_MAP:
-            sub_maps.append(_sub_map(number, node, labels))
+            sub_map = SubMap(
+                number=number,
+                cell_m=node.cell_m,
+                x_m=node.x_m,
+                y_m=node.y_m,
+                heading_rad=node.heading_rad,
+                width_m=node.width_m,
+                height_m=node.height_m,
+                members=labels,
+            )
+            sub_maps.append(sub_map)
 
     sub_maps.sort(key=lambda each: each.number)
     return [StoredTree(map=name, sub_maps=sub_maps)] if sub_maps else []
-
-
-def _sub_map(number: int, node: Map, members: list[str]) -> SubMap:
-    return SubMap(
-        number=number,
-        cell_m=node.cell_m,
-        x_m=node.x_m,
-        y_m=node.y_m,
-        heading_rad=node.heading_rad,
-        width_m=node.width_m,
-        height_m=node.height_m,
-        members=members,
-    )

@@ -17,11 +17,13 @@ from cogmap.services.motor.route import Route, pursuit
 
 TRACKED_POSES = 64
 SHORT_M = 2.0
+# Distance from the end of a path at which it stops; chosen, not tuned.
+END_M = 0.5
 TURNED_RAD = 1.0
 
 
 class Track:
-    """The poses of late, by their stamps."""
+    """The last TRACKED_POSES poses, by their stamps."""
 
     def __init__(self) -> None:
         self._poses: dict[int, Pose] = {}
@@ -33,33 +35,38 @@ class Track:
             del self._poses[min(self._poses)]
 
     def at(self, stamp_ns: int) -> Pose | None:
-        """The pose at a time; None where that is not known."""
+        """The pose at a time; None if that is not known."""
         return self._poses.get(stamp_ns)
 
 
 class Guide:
     """Drives through the places `ahead_1_m` and `left_1_m`, `ahead_2_m` and so on, of the pose at
-    `seen_ns`, and stands at the last; where the path is shorter than SHORT_M it is there already.
+    `seen_ns`, and stands at the last; if the path is shorter than SHORT_M it is there already.
 
-    They are kept by path integration: by how the pose has changed since. Where the pose then is not
+    They are kept by path integration: by how the pose has changed since. If the pose then is not
     known, as after a restart, it is the first that is given.
     """
 
     def __init__(self, parameters: Parameters, config: Config, track: Track) -> None:
         self._seen_ns = stamp(parameters, "seen_ns")
-        self._places_m = _places(parameters)
+        places_m: list[list[float]] = []
+        while f"ahead_{len(places_m) + 1}_m" in parameters or len(places_m) < 2:
+            each = len(places_m) + 1
+            places_m.append([number(parameters, f"{name}_{each}_m") for name in ("ahead", "left")])
+
+        self._places_m = np.array(places_m)
         self._config = config
         self._track = track
         self._before: Route | None = None
         self._route: Route | None = None
-        self._is_short = distances_along(self._places_m)[-1] <= max(SHORT_M, config.guided_m)
+        self._is_short = distances_along(self._places_m)[-1] <= SHORT_M
 
     def continue_from(self, before: Guide) -> None:
         """This program corrects another, by a share of what lies between their paths: what is seen
         is uncertain, and what was seen before counts too.
         """
         route = before._route or before._before
-        if route is not None and route.left_m > self._config.guided_m:
+        if route is not None and route.left_m > END_M:
             self._before = route
 
     def aim(self, pose: Pose) -> Aim | SpeedLimit:
@@ -70,33 +77,29 @@ class Guide:
             self._route = self._route_at(pose)
 
         aim = pursuit(self._route, pose, self._config)
-        return SpeedLimit.NO_ACTION if self._route.left_m <= self._config.guided_m else aim
+        return SpeedLimit.NO_ACTION if self._route.left_m <= END_M else aim
 
     def _route_at(self, pose: Pose) -> Route:
         """The path, as it is to be driven from a pose on."""
         seen = self._track.at(self._seen_ns) or pose
         frame = np.array([seen.x_m, seen.y_m, seen.heading_rad])
         places_m = transform_from(frame, self._places_m)
-        route = _joined(places_m, pose)
+        route = Route(places_m)
+        route.join(pose.x_m, pose.y_m)
         if self._before is None:
             return route
 
         self._before.advance(pose.x_m, pose.y_m)
-        share = self._config.guided_share
-        corrected = _between(self._before.pose, route.pose, share)
+        corrected = between(self._before.pose, route.pose, self._config.guided_share)
         self._before = None
-        return _joined(move_with(places_m, route.pose, corrected), pose)
+        moved = Route(move_with(places_m, route.pose, corrected))
+        moved.join(pose.x_m, pose.y_m)
+        return moved
 
 
-def _joined(places_m: Floats, pose: Pose) -> Route:
-    route = Route(places_m)
-    route.join(pose.x_m, pose.y_m)
-    return route
-
-
-def _between(before: Floats, now: Floats, share: float) -> Floats:
+def between(before: Floats, now: Floats, share: float) -> Floats:
     """(3,): the pose `now`, moved aside and turned towards `before` but for a share of what lies
-    between them; `now` itself where they lead elsewhere.
+    between them; `now` itself if they lead elsewhere.
     """
     turn_rad = math.remainder(float(before[2] - now[2]), math.tau)
     if abs(turn_rad) > TURNED_RAD:
@@ -106,14 +109,3 @@ def _between(before: Floats, now: Floats, share: float) -> Floats:
     aside_m = float((before[:2] - now[:2]) @ left)
     position_m = now[:2] + (1 - share) * aside_m * left
     return np.append(position_m, now[2] + (1 - share) * turn_rad)
-
-
-def _places(parameters: Parameters) -> Floats:
-    """(n, 2): the places that parameters number from 1. Raises MessageError where one lacks a
-    coordinate, or there are fewer than two.
-    """
-    places_m: list[list[float]] = []
-    while f"ahead_{len(places_m) + 1}_m" in parameters or len(places_m) < 2:
-        each = len(places_m) + 1
-        places_m.append([number(parameters, f"{name}_{each}_m") for name in ("ahead", "left")])
-    return np.array(places_m)

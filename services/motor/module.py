@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from cogmap.graph.graph import Graph
+from cogmap.robot import HALF_WIDTH_M, WHEEL_RADIUS_M
 from cogmap.runtime.module import Module
 from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
@@ -22,10 +23,10 @@ from cogmap.services.motor.config import Config
 from cogmap.services.motor.execution import Execution
 from cogmap.services.motor.gate import LockstepGate
 from cogmap.services.motor.motor import SensoryMotorMemory, halted, obstacle_ahead_m
+from cogmap.services.motor.programs import sought_by
 from cogmap.services.motor.reactive.escape import Escape
 from cogmap.services.motor.reactive.near import NearObstacles
 from cogmap.services.motor.reactive.stuck import StuckDetector
-from cogmap.services.motor.seeking import sought_by
 
 __all__ = ["Config", "MotorModule", "build"]
 
@@ -53,9 +54,9 @@ class MotorModule:
         self._config = config
         self._is_lockstep = run.lockstep
         self._gate = LockstepGate()
-        self._stuck = StuckDetector(config.stuck_m_s, config.stuck_after_s)
-        self._escape = Escape(config)
-        self._near = NearObstacles(config.half_width_m)
+        self._stuck = StuckDetector(config.stuck_after_s)
+        self._escape = Escape()
+        self._near = NearObstacles(HALF_WIDTH_M)
         self._motor = SensoryMotorMemory(config, self._near)
 
         self._graph = graph
@@ -108,7 +109,7 @@ class MotorModule:
         In lockstep a repeated scan is answered at once: by the command for the pose that waits, or
         by a halt where no pose has come since a restart.
         """
-        self._clear_m = obstacle_ahead_m(scan, self._config.half_width_m)
+        self._clear_m = obstacle_ahead_m(scan)
         is_repeated = scan.stamp_ns == self._gate.scan_ns
         if not is_repeated:
             self._near.on_scan(scan)
@@ -116,7 +117,8 @@ class MotorModule:
         self._gate.scan_ns = scan.stamp_ns
         self._newest_ns = max(self._newest_ns, scan.stamp_ns)
 
-        if is_repeated and self._is_lockstep and self._has_no_pose:
+        has_no_pose = self._answered is None and self._waiting is None
+        if is_repeated and self._is_lockstep and has_no_pose:
             command = self._remember(halted(scan.stamp_ns, SpeedLimit.NO_POSE))
             return [*self._offers(command), command]
         return self._replies(at_once=is_repeated)
@@ -125,21 +127,26 @@ class MotorModule:
         """Command the wheels for a new pose of the self node; repeat the command for a repeated
         pose.
         """
-        pose = _self_pose(delta)
-        if pose is None:
+        agents = [item for item in delta.operations if isinstance(item, Self)]
+        if delta.phase not in POSE_PHASES or not agents:
             return []
 
-        if self._answered is not None and self._is_lockstep and self._is_answered(delta):
-            return [self._answered]
+        answered = self._answered
+        is_pose_of_view = delta.phase is Phase.LOCALIZATION
+        is_answered = answered is not None and answered.stamp_ns == delta.stamp_ns
+        if answered is not None and is_answered and is_pose_of_view and self._is_lockstep:
+            return [answered]
 
         is_repeated = self._waiting is not None and self._waiting.stamp_ns == delta.stamp_ns
         plan = self._graph.get(Plan, PLAN_ID)
+        agent = agents[-1]
+        pose = Pose(x_m=agent.x_m, y_m=agent.y_m, heading_rad=agent.heading_rad)
         self._waiting = Estimate(delta.stamp_ns, delta.cycle, pose, plan)
         if self._is_resumed:
             self._gate.resume(delta.cycle)
             self._is_resumed = False
 
-        return self._replies(at_once=is_repeated and delta.phase is Phase.LOCALIZATION)
+        return self._replies(at_once=is_repeated and is_pose_of_view)
 
     def on_load(self) -> None:
         """Take up the plan of a graph that was loaded as a whole."""
@@ -188,19 +195,16 @@ class MotorModule:
         goal = self._sought
         self._sought = None
         operations: list[Operation] = []
-        if goal is not None and self._is_open(goal):
-            operations.append(goal)
+        if goal is not None:
+            plan = self._graph.get(Plan, PLAN_ID)
+            is_in_vain = plan is not None and goal.id in plan.unreachable
+            if is_in_vain or self._graph.get(Goal, goal.id) is None:
+                operations.append(goal)
 
         if not operations and not self._is_lockstep:
             return []
         cycle = self._graph.cycle
         return [Offer(stamp_ns=command.stamp_ns, cycle=cycle, operations=operations)]
-
-    def _is_open(self, goal: Goal) -> bool:
-        """Whether the agent has no goal of that name, or the plan has no route to it."""
-        plan = self._graph.get(Plan, PLAN_ID)
-        is_in_vain = plan is not None and goal.id in plan.unreachable
-        return is_in_vain or self._graph.get(Goal, goal.id) is None
 
     def _command(self, at_once: bool = False) -> MotorCommand | None:
         """The command for the newest pose, if there is one that waits for nothing any longer."""
@@ -217,23 +221,19 @@ class MotorModule:
         self._waiting = None
         self._answered_cycle = estimate.cycle
 
-        return self._remember(self._answer(estimate))
-
-    def _answer(self, estimate: Estimate) -> MotorCommand:
         stamp_ns = estimate.stamp_ns
         age_ns = self._age_ns(stamp_ns)
-
         self._execution.take(estimate.plan, estimate.pose)
         aim = self._execution.aim(stamp_ns, estimate.pose)
         if not isinstance(aim, Aim):
-            return halted(stamp_ns, aim, age_ns)
+            return self._remember(halted(stamp_ns, aim, age_ns))
 
         command = self._motor.command(stamp_ns, aim, self._clear_m, age_ns)
-        return self._escape.command(command, self._stuck.is_stuck)
+        return self._remember(self._escape.command(command, self._stuck.is_stuck))
 
     def _remember(self, command: MotorCommand) -> MotorCommand:
         wheels_rad_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2
-        self._stuck.on_command(wheels_rad_s * self._config.wheel_radius_m)
+        self._stuck.on_command(wheels_rad_s * WHEEL_RADIUS_M)
         self._answered = command
 
         return command
@@ -241,26 +241,6 @@ class MotorModule:
     def _age_ns(self, stamp_ns: int) -> int:
         """How much older than the newest message a stamp is; 0 in lockstep, where time waits."""
         return 0 if self._is_lockstep else max(0, self._newest_ns - stamp_ns)
-
-    @property
-    def _has_no_pose(self) -> bool:
-        """Whether none has come since the start: a restart loses the last one."""
-        return self._answered is None and self._waiting is None
-
-    def _is_answered(self, delta: Delta) -> bool:
-        last = self._answered
-        is_pose_of_view = delta.phase is Phase.LOCALIZATION
-        return is_pose_of_view and last is not None and last.stamp_ns == delta.stamp_ns
-
-
-def _self_pose(delta: Delta) -> Pose | None:
-    """The pose of the self node in a delta that moves it, otherwise None."""
-    agents = [item for item in delta.operations if isinstance(item, Self)]
-    if delta.phase not in POSE_PHASES or not agents:
-        return None
-
-    agent = agents[-1]
-    return Pose(x_m=agent.x_m, y_m=agent.y_m, heading_rad=agent.heading_rad)
 
 
 def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:

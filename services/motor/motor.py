@@ -9,6 +9,7 @@ import math
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.robot import CLEARANCE_M, HALF_WIDTH_M, TRACK_M, WHEEL_RADIUS_M
 from cogmap.schemas.sensing import MotorCommand, RangeScan, SpeedLimit
 from cogmap.services.motor.aim import Aim, Speed, in_bend, slowest
 from cogmap.services.motor.config import Config
@@ -21,11 +22,11 @@ ASIDE_RAD = 0.3
 TURN_TIME_S = 0.5
 
 
-def obstacle_ahead_m(scan: RangeScan, half_width_m: float) -> float:
-    """Distance of the nearest obstacle in a lane of twice `half_width_m`, infinite without one.
+def obstacle_ahead_m(scan: RangeScan) -> float:
+    """Distance of the nearest obstacle in the robot's lane, infinite without one.
 
     It is that of the second nearest sector, as one sector alone may be noise. Raises MessageError
-    where bearings and ranges do not pair.
+    if bearings and ranges do not pair.
     """
     bearing_rad = np.asarray(scan.bearing_rad.numpy(), float)
     range_m = np.asarray(scan.range_m.numpy(), float)
@@ -33,7 +34,7 @@ def obstacle_ahead_m(scan: RangeScan, half_width_m: float) -> float:
         raise MessageError(f"scan with {bearing_rad.shape} bearings and {range_m.shape} ranges")
 
     is_seen = range_m > 0
-    is_in_lane = np.abs(range_m * np.sin(bearing_rad)) < half_width_m
+    is_in_lane = np.abs(range_m * np.sin(bearing_rad)) < HALF_WIDTH_M
     is_in_front = np.abs(bearing_rad) < MAX_BEARING_RAD
     is_obstacle = is_seen & is_in_lane & is_in_front
 
@@ -69,14 +70,26 @@ class SensoryMotorMemory:
         """Wheel speeds towards `aim`, by a pose that is `pose_age_ns` old, with `clear_m` free
         ahead.
 
-        Where the aim is behind, or aside of an obstacle, the robot turns on the spot.
+        If the aim is behind, or aside of an obstacle, the robot turns on the spot.
         """
-        speed = self._speed(aim.speed, clear_m, pose_age_ns / 1e9)
+        pose_age_s = pose_age_ns / 1e9
+        free_m = max(0.0, clear_m - CLEARANCE_M)
+        before_obstacle_m_s = math.sqrt(2 * self._config.braking_m_s2 * free_m)
+        speed = slowest(
+            aim.speed,
+            Speed(before_obstacle_m_s, SpeedLimit.OBSTACLE),
+            Speed(self._speed_by_age(pose_age_s), SpeedLimit.POSE_AGE),
+        )
         is_blocked = speed.m_s <= 0.0
+
         may_turn = not is_blocked or speed.limit is SpeedLimit.OBSTACLE
-        if may_turn and self._must_turn(aim, is_blocked):
-            turn_m_s = self._turning_m_s(aim.bearing_rad, pose_age_ns / 1e9)
-            return self._wheels(stamp_ns, -turn_m_s, turn_m_s, speed.limit, pose_age_ns)
+        aside_rad = ASIDE_RAD if is_blocked else BEHIND_RAD
+        if may_turn and (aim.on_the_spot or abs(aim.bearing_rad) > aside_rad):
+            # Slower near the end of the turn, the more so the older the pose is.
+            duration_s = max(TURN_TIME_S, 2 * pose_age_s)
+            wanted_m_s = abs(aim.bearing_rad) / duration_s * TRACK_M / 2
+            turn_m_s = math.copysign(min(wanted_m_s, TURNING_SPEED_M_S), aim.bearing_rad)
+            return _wheels(stamp_ns, -turn_m_s, turn_m_s, speed.limit, pose_age_ns)
 
         if is_blocked:
             return halted(stamp_ns, speed.limit, pose_age_ns)
@@ -87,63 +100,27 @@ class SensoryMotorMemory:
             return halted(stamp_ns, SpeedLimit.OBSTACLE, pose_age_ns)
 
         speed = slowest(speed, in_bend(curvature_per_m, self._config))
-        half_turn_m_s = speed.m_s * curvature_per_m * self._config.track_m / 2
+        half_turn_m_s = speed.m_s * curvature_per_m * TRACK_M / 2
         left_m_s = speed.m_s - half_turn_m_s
         right_m_s = speed.m_s + half_turn_m_s
-        return self._wheels(stamp_ns, left_m_s, right_m_s, speed.limit, pose_age_ns)
-
-    def _must_turn(self, aim: Aim, is_blocked: bool) -> bool:
-        """Whether the point ahead is so far aside that the robot turns before it drives."""
-        if aim.on_the_spot:
-            return True
-        least_rad = ASIDE_RAD if is_blocked else BEHIND_RAD
-        return abs(aim.bearing_rad) > least_rad
-
-    def _turning_m_s(self, bearing_rad: float, pose_age_s: float) -> float:
-        """The speed of the right wheel, and of the left one backwards, to turn on the spot: slower
-        near the end of the turn, the more so the older the pose is.
-        """
-        duration_s = max(TURN_TIME_S, 2 * pose_age_s)
-        speed_m_s = abs(bearing_rad) / duration_s * self._config.track_m / 2
-        return math.copysign(min(speed_m_s, TURNING_SPEED_M_S), bearing_rad)
-
-    def _wheels(
-        self,
-        stamp_ns: int,
-        left_m_s: float,
-        right_m_s: float,
-        limit: SpeedLimit,
-        pose_age_ns: int,
-    ) -> MotorCommand:
-        radius_m = self._config.wheel_radius_m
-        return MotorCommand(
-            stamp_ns=stamp_ns,
-            left_wheel_rad_s=left_m_s / radius_m,
-            right_wheel_rad_s=right_m_s / radius_m,
-            slowed_by=limit,
-            pose_age_ns=pose_age_ns,
-        )
-
-    def _speed(self, wanted: Speed, clear_m: float, pose_age_s: float) -> Speed:
-        """The highest speed up to the one that is wanted that an obstacle and the pose's age
-        allow.
-        """
-        free_m = max(0.0, clear_m - self._config.clearance_m)
-        before_obstacle_m_s = math.sqrt(2 * self._config.braking_m_s2 * free_m)
-        by_age_m_s = self._speed_by_age(pose_age_s)
-        return slowest(
-            wanted,
-            Speed(before_obstacle_m_s, SpeedLimit.OBSTACLE),
-            Speed(by_age_m_s, SpeedLimit.POSE_AGE),
-        )
+        return _wheels(stamp_ns, left_m_s, right_m_s, speed.limit, pose_age_ns)
 
     def _speed_by_age(self, age_s: float) -> float:
         """The speed that covers `blind_m` within the pose's age, 0 beyond `max_pose_age_s`."""
-        config = self._config
         if age_s <= 0.0:
             return math.inf
-
-        if age_s > config.max_pose_age_s:
+        if age_s > self._config.max_pose_age_s:
             return 0.0
+        return self._config.blind_m / age_s
 
-        return config.blind_m / age_s
+
+def _wheels(
+    stamp_ns: int, left_m_s: float, right_m_s: float, limit: SpeedLimit, pose_age_ns: int
+) -> MotorCommand:
+    return MotorCommand(
+        stamp_ns=stamp_ns,
+        left_wheel_rad_s=left_m_s / WHEEL_RADIUS_M,
+        right_wheel_rad_s=right_m_s / WHEEL_RADIUS_M,
+        slowed_by=limit,
+        pose_age_ns=pose_age_ns,
+    )

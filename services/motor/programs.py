@@ -8,16 +8,19 @@ from typing import Protocol
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.schemas.cognition import ActionName
-from cogmap.schemas.nodes import NEVER_NS, Plan, PlanState, Self
+from cogmap.schemas.cognition import ActionName, MotorProgram
+from cogmap.schemas.nodes import NEVER_NS, Goal, Plan, PlanState, Self, goal_id
 from cogmap.schemas.sensing import Pose, SpeedLimit
 from cogmap.services.motor.aim import Aim, Speed, bearing_of
 from cogmap.services.motor.config import Config
 from cogmap.services.motor.guide import Guide, Track
-from cogmap.services.motor.parameters import Parameters, number
+from cogmap.services.motor.parameters import Parameters, number, word
 from cogmap.services.motor.route import Route, pursuit
 
 TURNED_RAD = 0.05
+# Chosen, not tuned: slow, and some two errors of a pose in the town (0.2 m) from the target.
+DOCK_M_S = 0.5
+DOCKED_M = 0.5
 
 
 class Program(Protocol):
@@ -37,8 +40,8 @@ class FollowPlan:
         self._without_route = SpeedLimit.NO_ROUTE
 
     def take(self, plan: Plan | None, agent: Pose | Self | None) -> None:
-        """Drive the route of a plan from where the agent is, where it is new. A route of one place
-        is at its end.
+        """Drive the route of a new plan from where the agent is. A route of one place is at its
+        end.
         """
         if plan is None or plan.planned_ns == self._planned_ns:
             return
@@ -66,9 +69,7 @@ class FollowPlan:
 
 
 class Halt:
-    """Stands. What the plan has to say about it goes first: the drive ends where it is at its
-    goal.
-    """
+    """Stands. The plan's own reason to halt goes first: the drive ends when it is at its goal."""
 
     def __init__(self, follow: FollowPlan) -> None:
         self._follow = follow
@@ -103,29 +104,26 @@ class Turn:
 class Dock:
     """Drives straight and slowly to `x_m` and `y_m`, and stands there."""
 
-    def __init__(self, parameters: Parameters, config: Config) -> None:
+    def __init__(self, parameters: Parameters) -> None:
         self._x_m = number(parameters, "x_m")
         self._y_m = number(parameters, "y_m")
-        self._config = config
         self._is_docked = False
 
     def aim(self, pose: Pose) -> Aim | SpeedLimit:
         """The target, until it is reached."""
         away_m = math.hypot(self._x_m - pose.x_m, self._y_m - pose.y_m)
-        self._is_docked |= away_m <= self._config.docked_m
+        self._is_docked |= away_m <= DOCKED_M
         if self._is_docked:
             return SpeedLimit.NO_ACTION
 
         bearing_rad = bearing_of(self._x_m, self._y_m, pose)
-        return Aim(bearing_rad, away_m, Speed(self._config.dock_m_s))
+        return Aim(bearing_rad, away_m, Speed(DOCK_M_S))
 
 
 def program_of(
     action: str, parameters: Parameters, follow: FollowPlan, config: Config, track: Track
 ) -> Program:
-    """The motor program of an action. Raises MessageError where there is none, or where it lacks a
-    parameter.
-    """
+    """The motor program of an action. Raises MessageError if it has none, or lacks a parameter."""
     match action:
         case ActionName.FOLLOW_PLAN:
             return follow
@@ -136,7 +134,20 @@ def program_of(
         case ActionName.TURN:
             return Turn(parameters)
         case ActionName.DOCK:
-            return Dock(parameters, config)
+            return Dock(parameters)
         case ActionName.GUIDE:
             return Guide(parameters, config, track)
     raise MessageError(f"no motor program for {action!r}: there are {', '.join(ActionName)}")
+
+
+def sought_by(program: MotorProgram) -> Goal | None:
+    """The goal that a motor program gives the agent; None if it is not one that seeks.
+
+    Raises MessageError if it lacks a parameter.
+    """
+    if program.action != ActionName.SEEK:
+        return None
+
+    need = word(program.parameters, "need")
+    sought = word(program.parameters, "object")
+    return Goal(id=goal_id(need), base_level=1.0, object=sought, need=need)

@@ -15,6 +15,8 @@ from cogmap.services.motor.config import Config
 STEP_M = 0.25
 SEARCH_M = 6.0
 SMOOTHED_M = 3.0
+LOOKAHEAD_M = 2.5
+"""Distance of the point that pure pursuit steers to: 0.6 s at cruising speed."""
 
 
 class Route:
@@ -25,8 +27,14 @@ class Route:
     def __init__(self, places_m: Floats) -> None:
         line_m = resample(places_m, STEP_M)
         self.points_m = resample(_smoothed(line_m), STEP_M)
-        self.curvature_per_m = _curvature(self.points_m)
+        self._last = len(self.points_m) - 1
         self._index = 0
+
+        ahead = np.gradient(self.points_m, axis=0)
+        heading_rad = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
+        turn_rad = np.abs(np.diff(heading_rad, append=0.0))
+        turn_rad[-1] = 0.0
+        self.curvature_per_m: Floats = turn_rad / STEP_M
 
     @property
     def travelled_m(self) -> float:
@@ -71,49 +79,31 @@ class Route:
 
         return float(window_per_m.max())
 
-    @property
-    def _last(self) -> int:
-        return len(self.points_m) - 1
-
 
 def pursuit(route: Route, pose: Pose, config: Config) -> Aim:
-    """The point of a route that pure pursuit steers to from a pose, slower in bends."""
+    """The point of a route that pure pursuit steers to from a pose, at the highest speed that the
+    bend ahead and the end of the route allow.
+    """
     route.advance(pose.x_m, pose.y_m)
-    lookahead_m = config.lookahead_m
-    x_m, y_m = route.ahead(lookahead_m)
+    x_m, y_m = route.ahead(LOOKAHEAD_M)
     away_m = math.hypot(x_m - pose.x_m, y_m - pose.y_m)
-    distance_m = max(lookahead_m / 2, away_m)
-    return Aim(bearing_of(x_m, y_m, pose), distance_m, _speed(route, config))
+    distance_m = max(LOOKAHEAD_M / 2, away_m)
 
-
-def _speed(route: Route, config: Config) -> Speed:
-    """The highest speed that the bend ahead and the end of the route allow."""
     braking_distance_m = config.cruise_m_s**2 / (2 * config.braking_m_s2)
     bend_per_m = route.sharpest(braking_distance_m)
     to_end_m_s = math.sqrt(2 * config.braking_m_s2 * route.left_m)
-    return slowest(
+    speed = slowest(
         Speed(config.cruise_m_s),
         in_bend(bend_per_m, config),
         Speed(to_end_m_s, SpeedLimit.ROUTE_END),
     )
+    return Aim(bearing_of(x_m, y_m, pose), distance_m, speed)
 
 
 def _nearest(points_m: Floats, x_m: float, y_m: float) -> int:
     """The index of that of (n, 2) points which is nearest to a position, the first of several."""
     away_m = np.hypot(*(points_m - (x_m, y_m)).T)
     return int(away_m.argmin())
-
-
-def _curvature(points_m: Floats) -> Floats:
-    """(n,): the curvature of a line of points every STEP_M, per metre, without sign."""
-    ahead = np.gradient(points_m, axis=0)
-    heading_rad = np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))
-
-    turn_rad = np.abs(np.diff(heading_rad, append=0.0))
-    turn_rad[-1] = 0.0
-    curvature_per_m: Floats = turn_rad / STEP_M
-
-    return curvature_per_m
 
 
 def _smoothed(points_m: Floats) -> Floats:

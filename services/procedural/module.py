@@ -16,7 +16,7 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Action, Behaviours, Broadcast
 from cogmap.schemas.graph import Delta
 from cogmap.services.procedural.config import Config
-from cogmap.services.procedural.guidance.memory import GuidanceMemory
+from cogmap.services.procedural.guidance.guidance_memory import GuidanceMemory
 from cogmap.services.procedural.learning import Reliability
 from cogmap.services.procedural.loading import BUILT_IN, load, load_guidance
 from cogmap.services.procedural.situations import Situations
@@ -40,12 +40,7 @@ class ProceduralMemory:
         self._graph = graph
         path = Path(config.schemes) if config.schemes else BUILT_IN
         self._schemes = load(path)
-        self._guidance = GuidanceMemory(
-            load_guidance(path),
-            config.max_guidance_schemes,
-            config.guidance_step_m,
-            config.guidance_ahead_m,
-        )
+        self._guidance = GuidanceMemory(load_guidance(path), config.max_guidance_schemes)
         self._reliability = Reliability(self._schemes)
         self._situations = Situations(config.graph_kinds, config.unconscious_share)
         self._waiting: list[Broadcast] = []
@@ -105,18 +100,16 @@ class ProceduralMemory:
 
     def _due(self) -> list[Behaviours]:
         published = []
-        while self._waiting and self._is_ready(self._waiting[0]):
+        while self._waiting:
+            first = self._waiting[0]
+            if self._is_lockstep:
+                is_lost = self._waiting[-1].cycle >= first.cycle + GIVEN_UP_CYCLES
+                is_answered = self._unanswered_cycle is None
+                is_settled = self._situations.is_settled(first.cycle)
+                if not is_settled or not (is_answered or is_lost):
+                    break
             published.append(self._behaviours(self._waiting.pop(0)))
         return published
-
-    def _is_ready(self, broadcast: Broadcast) -> bool:
-        if not self._is_lockstep:
-            return True
-
-        newest_cycle = self._waiting[-1].cycle
-        is_lost = newest_cycle >= broadcast.cycle + GIVEN_UP_CYCLES
-        is_answered = self._unanswered_cycle is None
-        return self._situations.is_settled(broadcast.cycle) and (is_answered or is_lost)
 
     def _behaviours(self, broadcast: Broadcast) -> Behaviours:
         nodes = self._situations.of(broadcast)

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import integrate
+from cogmap.geometry.se2 import moved_by
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import APART_M
 from cogmap.schemas import nodes
@@ -57,7 +57,8 @@ def individuals(percepts: Percepts, graph: Graph, motions: Array) -> Percepts:
     if agent is None:
         return percepts
 
-    pose = _moved(agent, motions)
+    before = np.array([agent.x_m, agent.y_m, agent.heading_rad])
+    pose = moved_by(before, np.asarray(motions.numpy(), np.float64))
     candidates = [_candidate(percept, pose, agent, graph) for percept in percepts.objects]
     is_here = _is_not_elsewhere(agent, percepts.stamp_ns) or _is_confirmed(candidates, agent, graph)
 
@@ -94,9 +95,9 @@ def as_entered(percepts: Percepts, graph: Graph) -> Percepts:
 
 def _is_not_elsewhere(agent: Self, stamp_ns: int) -> bool:
     """Whether it was found not long ago that the agent can be nowhere else on the map."""
-    if agent.not_elsewhere_ns == NEVER_NS:
+    if agent.misfits.not_elsewhere_ns == NEVER_NS:
         return False
-    return stamp_ns - agent.not_elsewhere_ns <= NOT_ELSEWHERE_NS
+    return stamp_ns - agent.misfits.not_elsewhere_ns <= NOT_ELSEWHERE_NS
 
 
 def _is_confirmed(candidates: Iterable[Candidate], agent: Self, graph: Graph) -> bool:
@@ -105,23 +106,10 @@ def _is_confirmed(candidates: Iterable[Candidate], agent: Self, graph: Graph) ->
         node = graph.get(Object, object_id(candidate.label))
         if node is None or not candidate.is_near:
             continue
-        if node.created_ns <= agent.last_fit_ns:
+        if node.created_ns <= agent.misfits.last_fit_ns:
             return True
 
     return False
-
-
-def _moved(agent: Self, motions: Array) -> Floats:
-    """(3,): the pose that the agent has moved to."""
-    pose = np.array([agent.x_m, agent.y_m, agent.heading_rad])
-    rows = np.asarray(motions.numpy(), np.float64)
-    if not len(rows):
-        return pose
-
-    speed, turn_rate, duration_s = rows[:, :3].T
-    steps = np.column_stack([speed * duration_s, np.zeros(len(rows)), turn_rate * duration_s])
-    *_, moved = integrate(pose, steps)
-    return np.asarray(moved, np.float64)
 
 
 def _standing_there(

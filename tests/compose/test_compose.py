@@ -15,7 +15,7 @@ import pytest
 from cogmap.bus.interface import Member
 from cogmap.bus.session import free_endpoint
 from cogmap.bus.zenoh_bus import ZenohBus
-from cogmap.cli.launch.metrics import Recording
+from cogmap.cli.launch.drive_metrics import Recording
 from cogmap.cli.launch.watch import Watch
 from cogmap.services import registry
 

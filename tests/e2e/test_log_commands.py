@@ -74,7 +74,7 @@ def test_info_counts_the_messages_of_each_topic_by_source(path: Path) -> None:
     assert wheels["sources"] == {"sim": COUNT}
 
     assert "sim:5" in text
-    assert "its recorder did not end it" in text.lower()
+    assert "the recording has no end" in text.lower()
 
 
 def test_info_names_a_gap(tmp_path: Path) -> None:

@@ -97,6 +97,7 @@ def test_ctrl_c_ends_a_drive_cleanly(start: Callable[..., Run]) -> None:
 
     assert run.end() == 130, run.output()
     assert run.summary()["ended_by"] == "interrupted"
+    assert "interrupted by Ctrl-C" in run.output()
     assert is_finished(run.folder / "log.mcap")
     outputs = [run.output()]
     outputs += [log.read_text() for log in run.folder.glob("*.log")]

@@ -4,11 +4,14 @@ the command.
 
 from __future__ import annotations
 
+import os
+import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import IO
 
 import pytest
 import zenoh
@@ -16,15 +19,20 @@ import zenoh
 from cogmap.bus.discovery import discover
 from cogmap.bus.session import free_endpoint, open_client
 from tests.support.system.networks import routed
+from tests.support.system.processes import wait_until
 
 TIMEOUT_S = 30.0
 NO_ROUTER = "tcp/127.0.0.1:1"
 FREE = "tcp/127.0.0.1:0"
+REFERENCE = Path(__file__).parents[1] / "replay" / "reference.mcap"
 
 
-def start(*arguments: str) -> subprocess.Popen[str]:
+def start(
+    *arguments: str, output: int | IO[str] = subprocess.PIPE, **environment: str
+) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "cogmap.cli.main", *arguments]
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    env = os.environ | environment
+    return subprocess.Popen(command, stdout=output, stderr=subprocess.PIPE, text=True, env=env)
 
 
 def sentence_of(process: subprocess.Popen[str]) -> str:
@@ -141,6 +149,54 @@ def test_whoever_finds_no_router_within_five_seconds_names_it(tmp_path: Path) ->
     for process in processes:
         assert sentence_of(process).startswith(expected)
     assert not log.exists()
+
+
+def test_ctrl_c_ends_at_once_whoever_waits_for_a_router() -> None:
+    commands = (["topic", "list"], ["topic", "echo", "clock"], ["graph"], ["module", "action"])
+    processes = [start(*command, "--connect", NO_ROUTER) for command in commands]
+    for process in processes:
+        wait_until(lambda pid=process.pid: is_waiting(pid), "it waits for a router")
+
+    asked_s = time.monotonic()
+    for process in processes:
+        process.send_signal(signal.SIGINT)
+
+    for process in processes:
+        assert process.wait(TIMEOUT_S) == 130
+    assert time.monotonic() - asked_s < 1.5
+
+
+def is_waiting(pid: int) -> bool:
+    """Whether a process has imported the client of the bus, which waits for the router next."""
+    return "zenoh" in Path(f"/proc/{pid}/maps").read_text()
+
+
+def test_a_full_disk_and_an_ascii_terminal_are_a_sentence() -> None:
+    with Path("/dev/full").open("w") as full:
+        onto_full_disk = start("config", output=full)
+        _, errors = onto_full_disk.communicate(timeout=TIMEOUT_S)
+    assert onto_full_disk.returncode == 2
+    assert errors == (
+        "cogmap: cannot write the output (No space left on device): make room there, or write "
+        "elsewhere\n"
+    )
+
+    ascii_only = start("log", "summary", str(REFERENCE), PYTHONIOENCODING="ascii")
+    _, errors = ascii_only.communicate(timeout=TIMEOUT_S)
+    assert ascii_only.returncode == 2
+    assert errors == (
+        "cogmap: the output is encoded as ascii, which has no '\\xb2': set PYTHONIOENCODING=utf-8\n"
+    )
+
+
+def test_a_reader_that_has_seen_enough_gets_no_traceback() -> None:
+    process = start("config")
+    assert process.stdout is not None
+    process.stdout.close()
+    assert process.stderr is not None
+
+    assert process.stderr.read() == ""
+    assert process.wait(TIMEOUT_S) == 1
 
 
 def wait_for_processes(session: zenoh.Session, names: set[str]) -> None:

@@ -17,9 +17,9 @@ from typing import IO
 import msgspec
 
 from cogmap.cli.launch.command_line import environment
-from cogmap.cli.launch.forking.protocol import MAX_BYTES, Request, report_decoder
+from cogmap.cli.launch.forking.server import MAX_BYTES, Request, report_decoder
 
-# Room for the command lines of those that are forked: see `title`.
+# Room for the command lines of those that are forked: see `show_command_line`.
 _ROOM = " " * 4096
 _SERVER = (sys.executable, "-P", "-m", "cogmap.cli.launch.forking.server")
 

@@ -1,16 +1,16 @@
 """What a log contains and where: its channels, chunks and metadata, read by the MCAP library.
 
-A finished log has an index at its end. One that is being written, or was cut off, is read from its
-beginning up to the first record that is not whole.
+A log with chunks and an index of them at its end is read by that. Any other, such as one that is
+being written, was cut off, or has messages outside chunks, is read from its beginning up to the
+first record that is not whole.
 """
 
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from mcap.data_stream import ReadDataStream
 from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, Footer, Header, McapRecord, Message, Metadata
 from mcap.stream_reader import StreamReader, breakup_chunk
@@ -18,7 +18,8 @@ from mcap.writer import MCAP0_MAGIC
 
 from cogmap.errors import LogError
 
-_RECORD_HEAD_BYTES = 9
+# A run of messages outside chunks is read at once: about what a chunk of ours holds.
+RUN_BYTES = 1 << 20
 
 
 class DamageError(Exception):
@@ -27,11 +28,21 @@ class DamageError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ChunkSpan:
-    """Where a chunk begins in the file, and the log times of its first and last message."""
+    """A chunk, or a run of messages outside chunks: where it begins and ends in the file, and the
+    earliest and latest log time in it.
+    """
 
     offset: int
+    end: int
     first_ns: int
     last_ns: int
+    is_chunk: bool = True
+
+    def extended(self, end: int, time_ns: int) -> ChunkSpan:
+        """Return the run with one more message, which ends at `end`."""
+        first_ns = min(self.first_ns, time_ns)
+        last_ns = max(self.last_ns, time_ns)
+        return replace(self, end=end, first_ns=first_ns, last_ns=last_ns)
 
 
 @dataclass
@@ -39,7 +50,7 @@ class LogIndex:
     """The contents of a log but for its messages; chunks in order of time.
 
     `unreadable_bytes` at its end belong to no whole record. Channels that only a later chunk
-    declares are missing where the log has no index of its own.
+    declares are missing if the log has no index of its own.
     """
 
     library: str = ""
@@ -50,7 +61,7 @@ class LogIndex:
 
 
 def check_magic(path: Path) -> None:
-    """Raise LogError where there is no file at `path`, or it is not MCAP."""
+    """Raise LogError if there is no file at `path`, or it is not MCAP."""
     try:
         with path.open("rb") as file:
             magic = file.read(len(MCAP0_MAGIC))
@@ -63,7 +74,7 @@ def check_magic(path: Path) -> None:
 
 
 def read_index(path: Path) -> LogIndex:
-    """The index of the log at `path`. Raises LogError where there is no file, or it is not MCAP."""
+    """Read the index of the log at `path`. Raises LogError if there is none, or it is not MCAP."""
     check_magic(path)
     index = _from_summary(path) or _from_scan(path)
     index.chunks.sort(key=lambda chunk: (chunk.first_ns, chunk.last_ns, chunk.offset))
@@ -71,12 +82,17 @@ def read_index(path: Path) -> LogIndex:
 
 
 def read_chunk(path: Path, chunk: ChunkSpan) -> list[McapRecord]:
-    """The schemas, channels and messages in a chunk, as written. Raises DamageError."""
+    """Read the schemas, channels and messages in a chunk, as written. Raises DamageError."""
+    records: list[McapRecord] = []
     try:
         with path.open("rb") as file:
-            file.seek(chunk.offset + _RECORD_HEAD_BYTES)
-            record = Chunk.read(ReadDataStream(file))
-        return open_chunk(record)
+            file.seek(chunk.offset)
+            reader = StreamReader(file, skip_magic=True, emit_chunks=True)
+            for record in reader.records:
+                records += open_chunk(record) if isinstance(record, Chunk) else [record]
+                if file.tell() >= chunk.end:
+                    break
+        return records
     except OSError as error:
         raise LogError(f"cannot read {path}: {error.strerror}") from None
     except DamageError:
@@ -86,7 +102,7 @@ def read_chunk(path: Path, chunk: ChunkSpan) -> list[McapRecord]:
 
 
 def open_chunk(chunk: Chunk) -> list[McapRecord]:
-    """The schemas, channels and messages in a chunk. Raises DamageError for a wrong checksum."""
+    """Unpack the records of a chunk. Raises DamageError, also for a wrong checksum."""
     try:
         return breakup_chunk(chunk, validate_crc=True)
     except Exception as error:  # each decompressor has errors of its own
@@ -94,22 +110,27 @@ def open_chunk(chunk: Chunk) -> list[McapRecord]:
 
 
 def channels_in(records: list[McapRecord]) -> dict[int, Channel]:
-    """The channels that a chunk declares, by their numbers."""
+    """Return the channels among records, by their numbers."""
     return {record.id: record for record in records if isinstance(record, Channel)}
 
 
 def messages_in(records: list[McapRecord]) -> list[Message]:
-    """The messages in a chunk, in the order in which they were written."""
+    """Return the messages among records, in the order in which they were written."""
     return [record for record in records if isinstance(record, Message)]
 
 
 def _from_summary(path: Path) -> LogIndex | None:
-    """The index that a finished log has at its end; None where there is none, or it is damaged."""
+    """Read the index of chunks at the end of a log; None if there is none, or it is damaged."""
     try:
         with path.open("rb") as file:
             reader = SeekingReader(file, record_size_limit=path.stat().st_size)
             summary = reader.get_summary()
-            if summary is None:
+            facts = summary.statistics if summary else None
+            if summary is None or facts is None or not facts.chunk_count:
+                return None
+            if facts.chunk_count != len(summary.chunk_indexes):
+                return None
+            if facts.metadata_count != len(summary.metadata_indexes):
                 return None
             header = reader.get_header()
             metadata = [(record.name, record.metadata) for record in reader.iter_metadata()]
@@ -117,14 +138,19 @@ def _from_summary(path: Path) -> LogIndex | None:
         return None
 
     chunks = [
-        ChunkSpan(chunk.chunk_start_offset, chunk.message_start_time, chunk.message_end_time)
+        ChunkSpan(
+            chunk.chunk_start_offset,
+            chunk.chunk_start_offset + chunk.chunk_length,
+            chunk.message_start_time,
+            chunk.message_end_time,
+        )
         for chunk in summary.chunk_indexes
     ]
     return LogIndex(header.library, dict(summary.channels), metadata, chunks)
 
 
 def _from_scan(path: Path) -> LogIndex:
-    """The index of all that is whole, up to the first record that is not."""
+    """Index all that is whole, up to the first record that is not."""
     index = LogIndex()
     size = path.stat().st_size
     with path.open("rb") as file:
@@ -132,15 +158,15 @@ def _from_scan(path: Path) -> LogIndex:
         end = len(MCAP0_MAGIC)
         with suppress(Exception):  # the library raises whatever the nonsense in it leads to
             for record in reader.records:
-                _enter(index, record, end)
+                _enter(index, record, end, file.tell())
                 end = size if isinstance(record, Footer) else file.tell()
 
     index.unreadable_bytes = max(0, size - end)
     return index
 
 
-def _enter(index: LogIndex, record: McapRecord, offset: int) -> None:
-    """Put a record that begins at `offset` into the index."""
+def _enter(index: LogIndex, record: McapRecord, offset: int, end: int) -> None:
+    """Put a record that lies from `offset` to `end` into the index."""
     match record:
         case Header():
             index.library = record.library
@@ -150,14 +176,15 @@ def _enter(index: LogIndex, record: McapRecord, offset: int) -> None:
             index.metadata.append((record.name, record.metadata))
         case Chunk():
             if not index.chunks:
-                index.channels |= _declared(record)
-            span = ChunkSpan(offset, record.message_start_time, record.message_end_time)
+                # A chunk that is damaged declares none: its reader reports it.
+                with suppress(DamageError):
+                    index.channels |= channels_in(open_chunk(record))
+            span = ChunkSpan(offset, end, record.message_start_time, record.message_end_time)
             index.chunks.append(span)
-
-
-def _declared(chunk: Chunk) -> dict[int, Channel]:
-    """The channels that a chunk declares; none where it is damaged, which its reader reports."""
-    try:
-        return channels_in(open_chunk(chunk))
-    except DamageError:
-        return {}
+        case Message():
+            last = index.chunks[-1] if index.chunks else None
+            if last is not None and not last.is_chunk and end - last.offset <= RUN_BYTES:
+                index.chunks[-1] = last.extended(end, record.log_time)
+            else:
+                run = ChunkSpan(offset, end, record.log_time, record.log_time, is_chunk=False)
+                index.chunks.append(run)

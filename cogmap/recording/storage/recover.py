@@ -19,7 +19,13 @@ from mcap.records import (
 from mcap.writer import CompressionType, Writer
 
 from cogmap.recording.storage import format as layout
-from cogmap.recording.storage.index import DamageError, channels_in, messages_in, open_chunk
+from cogmap.recording.storage.index import (
+    RUN_BYTES,
+    DamageError,
+    channels_in,
+    messages_in,
+    open_chunk,
+)
 from cogmap.recording.storage.reader import Progress
 from cogmap.recording.storage.resync import LogBytes, RecordSpan
 from cogmap.recording.storage.writer import UNBOUNDED, cannot_write, open_new
@@ -71,6 +77,8 @@ class _Rescue:
         self._channels: dict[int, Channel] = {}
         self._written: dict[int, int] = {}
         self._last_chunk_lost = False
+        self._run: list[McapRecord] = []
+        self._run_bytes = 0
 
     def run(self, progress: Progress | None) -> Recovery:
         """Copy all; what was saved."""
@@ -79,6 +87,7 @@ class _Rescue:
             self._try_to_copy(span)
             if progress is not None:
                 progress(span.end / self._source.size)
+        self._copy_run()
 
         facts = {"from": self._name, "lost_bytes": str(self._recovery.lost_bytes)}
         self._writer.add_metadata("recovered", facts)
@@ -103,18 +112,34 @@ class _Rescue:
         """Copy what a record holds. Raises DamageError."""
         match record:
             case Chunk():
-                self._copy_chunk(open_chunk(record))
+                self._copy_run()
+                self._copy_records(open_chunk(record))
                 self._last_chunk_lost = False
+            case Schema() | Channel() | Message():
+                self._run.append(record)
+                if isinstance(record, Message):
+                    self._run_bytes += len(record.data)
+                if self._run_bytes >= RUN_BYTES:
+                    self._copy_run()
             case MessageIndex() if self._last_chunk_lost:
                 self._count_lost(record)
             case Metadata():
                 self._writer.add_metadata(record.name, record.metadata)
 
-    def _copy_chunk(self, contents: list[McapRecord]) -> None:
+    def _copy_run(self) -> None:
+        """Copy the messages outside chunks that were read since the last time."""
+        run = self._run
+        self._run = []
+        self._run_bytes = 0
+        self._copy_records(run)
+
+    def _copy_records(self, contents: list[McapRecord]) -> None:
         messages = messages_in(contents)
         self._schemas |= {record.id: record for record in contents if isinstance(record, Schema)}
         self._channels |= channels_in(contents)
         self._check_channels(messages)
+        if not messages:
+            return
 
         for identifier in sorted(self._channels.keys() - self._written.keys()):
             self._write_channel(self._channels[identifier])

@@ -10,6 +10,7 @@ chunk's compression. The contents of records are the library's to read.
 from __future__ import annotations
 
 import mmap
+import re
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -18,20 +19,21 @@ from pathlib import Path
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Header, McapRecord, MessageIndex, Metadata, Schema
+from mcap.records import Channel, Chunk, Header, McapRecord, Message, MessageIndex, Metadata, Schema
 from mcap.writer import MCAP0_MAGIC
 
 from cogmap.errors import LogError
 from cogmap.recording.storage.index import DamageError, check_magic
 
 _HEAD = struct.Struct("<BQ")
-_COMPRESSION = b"\x03\x00\x00\x00lz4"
+_COMPRESSION = re.compile(rb"\x03\x00\x00\x00lz4|\x04\x00\x00\x00zstd")
 _COMPRESSION_AT = _HEAD.size + struct.calcsize("<QQQI")
 _LAST_OPCODE = max(Opcode)
 _KINDS: dict[int, type[McapRecord]] = {
     Opcode.HEADER: Header,
     Opcode.SCHEMA: Schema,
     Opcode.CHANNEL: Channel,
+    Opcode.MESSAGE: Message,
     Opcode.CHUNK: Chunk,
     Opcode.MESSAGE_INDEX: MessageIndex,
     Opcode.METADATA: Metadata,
@@ -81,8 +83,10 @@ class LogBytes:
         if kind is None:
             return None
         content = ReadDataStream(BytesIO(self._bytes[span.start : span.end]))
+        # Of a message, the length determines where its content ends.
+        length = [span.end - span.start] if kind is Message else []
         try:
-            record: McapRecord = kind.read(content)  # type: ignore[attr-defined]
+            record: McapRecord = kind.read(content, *length)  # type: ignore[attr-defined]
         except Exception as error:  # the library raises whatever the nonsense in it leads to
             raise DamageError(f"a record of kind {span.opcode} cannot be read: {error}") from error
         return record
@@ -126,11 +130,9 @@ class LogBytes:
 
     def _next_chunk(self, offset: int) -> int | None:
         """Where the first chunk at or after `offset` begins that could be whole."""
-        position = self._bytes.find(_COMPRESSION, offset)
-        while position >= 0:
-            start = position - _COMPRESSION_AT
+        for found in _COMPRESSION.finditer(self._bytes, offset):
+            start = found.start() - _COMPRESSION_AT
             is_chunk = start >= offset and self._bytes[start] == Opcode.CHUNK
             if is_chunk and self._begins_record(start):
                 return start
-            position = self._bytes.find(_COMPRESSION, position + 1)
         return None

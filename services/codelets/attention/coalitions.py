@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 
 import msgspec
 
@@ -20,7 +20,6 @@ def coalition(
     codelet: str,
     nodes: list[AnyNode],
     graph: Graph,
-    base_level: float,
     links: Iterable[Link] = (),
     *,
     percepts: Iterable[Percept] = (),
@@ -29,26 +28,41 @@ def coalition(
     """A coalition of `nodes`, with their links to places and `links`, the maps they are on, how
     those among `percepts` stand to the agent, and the `feeling` about it.
 
-    Its activation is base-level x sum(total activation + |incentive salience|) / 2n over its n
-    nodes and links, as in LIDA's framework. A link is as active and as salient as the node that it
-    begins at, whose activation it passes on, times its weight.
+    Its activation is sum(total activation + |incentive salience|) / 2n over its n nodes and links,
+    as in LIDA's framework; the base level of attention codelets, by which LIDA multiplies that, is
+    1, as they do not learn. A link is as active and as salient as the node that it begins at, whose
+    activation it passes on, times its weight.
     """
-    every_link = [*_links_to_places(nodes, graph), *links]
-    strengths = {node.id: _strength(node, graph) for node in nodes}
+    every_link = []
+    for node in nodes:
+        place = graph.links.target(node.id, LinkKind.AT)
+        if place is not None:
+            every_link.append(Link(source=node.id, target=place, kind=LinkKind.AT))
+
+    every_link += links
+    strengths = {node.id: graph.total_activation(node) + abs(node.salience) for node in nodes}
     total = sum(strengths.values())
     for link in every_link:
         total += link.weight * strengths.get(link.source, 0.0)
 
-    number = len(nodes) + len(every_link)
-    activation = base_level * total / (2 * number)
+    relations = {}
+    for percept in percepts:
+        name = object_id(percept.label)
+        if name in strengths and percept.has_bearing and percept.has_range:
+            look = look_of(percept.label)
+            relations[name] = Relation(
+                look=look, range_m=percept.range_m, bearing_rad=percept.bearing_rad
+            )
 
+    number = len(nodes) + len(every_link)
+    activation = total / (2 * number)
     return Coalition(
         codelet=codelet,
         activation=min(1.0, activation),
         nodes=[_as_of_now(node, graph) for node in nodes],
         links=every_link,
         maps=_maps_of(nodes, graph),
-        relations=_relations(percepts, strengths),
+        relations=relations,
         feeling=feeling,
     )
 
@@ -59,7 +73,7 @@ def felt(node: AnyNode, salience: float) -> AnyNode:
 
 
 def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
-    """The objects of the map that are in view, by label, each as salient as its percept where that
+    """The objects of the map that are in view, by label, each as salient as its percept if that
     is more than what is felt about it in the graph.
     """
     saliences = {object_id(percept.label): percept.salience for percept in percepts}
@@ -69,37 +83,6 @@ def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
         objects.append(msgspec.structs.replace(node, salience=salience))
 
     return objects
-
-
-def _relations(percepts: Iterable[Percept], names: Container[str]) -> dict[str, Relation]:
-    """The relations of the objects `names` to the agent, as far as they were perceived."""
-    relations = {}
-    for percept in percepts:
-        name = object_id(percept.label)
-        if name in names and percept.has_bearing and percept.has_range:
-            relations[name] = Relation(
-                look=look_of(percept.label),
-                range_m=percept.range_m,
-                bearing_rad=percept.bearing_rad,
-            )
-
-    return relations
-
-
-def _strength(node: AnyNode, graph: Graph) -> float:
-    """Total activation + |incentive salience|."""
-    return graph.total_activation(node) + abs(node.salience)
-
-
-def _links_to_places(nodes: list[AnyNode], graph: Graph) -> list[Link]:
-    """The links of nodes to the places where they are."""
-    links = []
-    for node in nodes:
-        place = graph.links.target(node.id, LinkKind.AT)
-        if place is not None:
-            links.append(Link(source=node.id, target=place, kind=LinkKind.AT))
-
-    return links
 
 
 def _maps_of(nodes: list[AnyNode], graph: Graph) -> list[str]:

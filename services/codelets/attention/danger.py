@@ -8,16 +8,15 @@ import msgspec
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from cogmap.robot import HALF_WIDTH_M
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.robot import CLEARANCE_M, HALF_WIDTH_M
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self, object_id
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.attention.coalitions import coalition, felt
-from cogmap.services.codelets.attention.config import SECTION, Config, Danger
-from cogmap.services.codelets.attention.memory import (
+from cogmap.services.codelets.attention.pending import (
     brought,
     is_refractory,
     kept,
@@ -29,32 +28,37 @@ from cogmap.services.codelets.attention.memory import (
 NAME = "danger"
 AHEAD = "ahead"
 BAD = -1.0
+# Little more than the distance at which the robot is stopped.
+NEAREST_M = CLEARANCE_M + 0.4
+# After so many cycles without a danger the next one is another, and brought again.
+SAME_CYCLES = 25
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task where something stands near ahead, and until consciousness has had it."""
-    settings = config.danger
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
+    """One task if something stands near ahead, and until that is conscious."""
     if graph.agent is None or context.scan is None:
         return []
-    if is_refractory(NAME, graph, context.cycle, settings.refractory_cycles):
+    if is_refractory(NAME, graph, context.cycle):
         return []
 
     percepts = context.percepts.objects
     task = context.task(NAME, about=[SELF_ID], percepts=percepts, with_scan=True)
-    is_due = bool(memory_of(NAME, graph).pending) or is_blocked(task, settings)
+    is_due = bool(memory_of(NAME, graph).pending) or is_blocked(task)
     return [task] if is_due else []
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """A coalition of the self and the nearest object in view, by which the place is known again."""
     agent = graph.agent
-    settings = config.danger
     if agent is None:
         return Answer()
 
     memory = without_conscious(memory_of(NAME, graph))
-    if is_blocked(task, settings):
-        memory = _noted(memory, task.cycle, settings)
+    if is_blocked(task):
+        last = memory.noted.get(AHEAD)
+        memory = msgspec.structs.replace(memory, noted={AHEAD: task.cycle})
+        if last is None or task.cycle - last > SAME_CYCLES:
+            memory = with_pending(memory, [AHEAD])
     if not memory.pending:
         return kept(memory, graph)
 
@@ -67,7 +71,6 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         NAME,
         content,
         graph,
-        settings.base_level,
         percepts=task.percepts,
         feeling=Feeling.DANGER,
     )
@@ -81,13 +84,11 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Self, Object, Attention}),
     writes=frozenset({Attention}),
-    config=Config,
-    section=SECTION,
 )
 
 
-def is_blocked(task: Task, settings: Danger) -> bool:
-    """Whether the range scan has something near in the lane ahead, in two of its rays: one alone
+def is_blocked(task: Task) -> bool:
+    """If the range scan has something near in the lane ahead, in two of its rays: one alone
     may be noise.
     """
     if task.scan is None:
@@ -96,17 +97,8 @@ def is_blocked(task: Task, settings: Danger) -> bool:
     bearing_rad, range_m = np.asarray(task.scan.numpy(), np.float64).T
     ahead_m = range_m * np.cos(bearing_rad)
     is_in_lane = np.abs(range_m * np.sin(bearing_rad)) < HALF_WIDTH_M
-    is_near = (range_m > 0) & (ahead_m > 0) & (ahead_m <= settings.nearest_m)
+    is_near = (range_m > 0) & (ahead_m > 0) & (ahead_m <= NEAREST_M)
     return int((is_in_lane & is_near).sum()) > 1
-
-
-def _noted(memory: Attention, cycle: int, settings: Danger) -> Attention:
-    """`memory` after a cycle with something ahead: pending where nothing was there for long."""
-    last = memory.noted.get(AHEAD)
-    noted = msgspec.structs.replace(memory, noted={AHEAD: cycle})
-    if last is not None and cycle - last <= settings.same_cycles:
-        return noted
-    return with_pending(noted, [AHEAD])
 
 
 def _nearest_object(percepts: list[Percept], graph: Graph) -> Object | None:

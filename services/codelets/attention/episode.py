@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas import nodes
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import SELF_ID, Attention, Self
 from cogmap.services.codelets.attention.coalitions import coalition
-from cogmap.services.codelets.attention.config import SECTION, Config
-from cogmap.services.codelets.attention.memory import brought, is_refractory, memory_of
+from cogmap.services.codelets.attention.pending import brought, is_refractory, memory_of
 
 NAME = "episode"
+# The node of an episode decays within as many cycles: it is brought once.
+REFRACTORY_CYCLES = 10
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task where an episode was recalled just now, and it does not wait."""
-    if is_refractory(NAME, graph, context.cycle, config.episode.refractory_cycles):
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
+    """One task if an episode was recalled just now, and the codelet does not wait."""
+    if is_refractory(NAME, graph, context.cycle, REFRACTORY_CYCLES):
         return []
 
     recalled = recalled_episodes(graph)
@@ -27,7 +28,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     return [context.task(NAME, about=[SELF_ID, *(node.id for node in recalled)])]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """A coalition of the self and the most active episode, as salient as that is."""
     agent = graph.agent
     recalled = recalled_episodes(graph)
@@ -35,7 +36,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         return Answer()
 
     best = max(recalled, key=lambda node: (graph.activation(node), node.number))
-    found = coalition(NAME, [agent, best], graph, config.episode.base_level)
+    found = coalition(NAME, [agent, best], graph)
     return brought(memory_of(NAME, graph), found, task.cycle, graph)
 
 
@@ -46,8 +47,6 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Self, nodes.Episode, Attention}),
     writes=frozenset({Attention}),
-    config=Config,
-    section=SECTION,
 )
 
 

@@ -4,12 +4,10 @@ changed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import msgspec
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas import nodes
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import Link, Phase
@@ -25,8 +23,7 @@ from cogmap.schemas.nodes import (
     Self,
 )
 from cogmap.services.codelets.attention.coalitions import coalition, felt
-from cogmap.services.codelets.attention.config import SECTION, Config
-from cogmap.services.codelets.attention.memory import (
+from cogmap.services.codelets.attention.pending import (
     brought,
     is_refractory,
     kept,
@@ -37,13 +34,17 @@ from cogmap.services.codelets.attention.memory import (
 from cogmap.services.codelets.nodes import nodes_of
 
 NAME = "goal"
+# Goals and plans last for minutes: once a second is enough.
+REFRACTORY_CYCLES = 4
+# The salience of a plan that is new, and of a goal reached.
+CHANGE_SALIENCE = 0.5
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task where there is a route to a goal or frontier, or a plan or goal has changed, and it
-    does not wait.
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
+    """One task if there is a route to a goal or frontier, or a plan or goal has changed, and the
+    codelet does not wait.
     """
-    if is_refractory(NAME, graph, context.cycle, config.goal.refractory_cycles):
+    if is_refractory(NAME, graph, context.cycle, REFRACTORY_CYCLES):
         return []
 
     plan = graph.get(Plan, PLAN_ID)
@@ -55,7 +56,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     return [context.task(NAME, about=[SELF_ID, PLAN_ID])]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """A coalition of the self, the plan and its next goal, and the goals that were reached."""
     agent = graph.agent
     plan = graph.get(Plan, PLAN_ID)
@@ -64,8 +65,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         return Answer()
 
     content: list[AnyNode] = [agent]
-    is_told = plan is not None and (plan.state is PlanState.READY or PLAN_ID in memory.pending)
-    if plan is not None and is_told:
+    if plan is not None and (plan.state is PlanState.READY or PLAN_ID in memory.pending):
         content.append(plan)
         content += nodes_of(graph, nodes.Goal, plan.goals[:1])
 
@@ -75,9 +75,16 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if len(content) == 1:
         return kept(memory, graph)
 
-    salient = _with_feelings(content, memory.pending, config.goal.change_salience)
-    links = _links_towards(content, graph)
-    found = coalition(NAME, salient, graph, config.goal.base_level, links)
+    names = {node.id for node in content}
+    salient = [
+        felt(node, CHANGE_SALIENCE) if node.id in memory.pending else node for node in content
+    ]
+    links = []
+    target = graph.links.target(PLAN_ID, LinkKind.TOWARDS)
+    if target is not None and {PLAN_ID, target} <= names:
+        links.append(Link(source=PLAN_ID, target=target, kind=LinkKind.TOWARDS))
+
+    found = coalition(NAME, salient, graph, links)
     return brought(memory, found, task.cycle, graph)
 
 
@@ -88,8 +95,6 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Self, nodes.Goal, Plan, Attention, LinkKind.TOWARDS}),
     writes=frozenset({Attention}),
-    config=Config,
-    section=SECTION,
 )
 
 
@@ -116,21 +121,3 @@ def _with_changes(memory: Attention, graph: Graph) -> Attention:
     pending = {name: cycle for name, cycle in memory.pending.items() if name in state}
     noted = msgspec.structs.replace(memory, noted=state, pending=pending)
     return with_pending(noted, changed)
-
-
-def _with_feelings(
-    content: Iterable[AnyNode], changed: Iterable[str], salience: float
-) -> list[AnyNode]:
-    """The nodes, with a feeling attached to those that changed."""
-    names = set(changed)
-    return [felt(node, salience) if node.id in names else node for node in content]
-
-
-def _links_towards(content: Iterable[AnyNode], graph: Graph) -> list[Link]:
-    """The link of the plan to its next goal, where both are in `content`."""
-    names = {node.id for node in content}
-    target = graph.links.target(PLAN_ID, LinkKind.TOWARDS)
-    if target is None or not {PLAN_ID, target} <= names:
-        return []
-
-    return [Link(source=PLAN_ID, target=target, kind=LinkKind.TOWARDS)]

@@ -15,10 +15,10 @@ from cogmap.graph.window import ROAD_FROM, Extent
 from cogmap.schemas.nodes import PLAN_ID, PathColumn, PlaceColumn, Plan, Self
 from cogmap.services.codelets.planning.driven import POSITION
 
-# A lane is straight that turns by no more so far before and behind. Where it bends, what stands
-# beyond the bend seems to stand across it.
+# A lane is straight that turns by no more so far before and behind. At a bend, what stands beyond
+# seems to stand across it.
 STRAIGHT_M = (4.0, 8.0)
-LARGEST_TURN_RAD = 0.4
+MAX_TURN_RAD = 0.4
 # The direction of a route is that from as many places before to as many after.
 ROUTE_PLACES = 3
 # Beyond the reach of the scan.
@@ -38,13 +38,9 @@ class Lane(NamedTuple):
 
 def lanes(agent: Self, graph: Graph) -> list[Lane]:
     """The straight parts of the plan's route ahead and of the path that the agent drove."""
-    return [_route_ahead(agent, graph), _driven(graph)]
-
-
-def _driven(graph: Graph) -> Lane:
     path = rows_of(graph.path)
-    lane = Lane(path[:, POSITION], path[:, PathColumn.HEADING_RAD])
-    return lane.where(_is_straight(lane))
+    driven = Lane(path[:, POSITION], path[:, PathColumn.HEADING_RAD])
+    return [_route_ahead(agent, graph), driven.where(_is_straight(driven))]
 
 
 def _route_ahead(agent: Self, graph: Graph) -> Lane:
@@ -61,37 +57,24 @@ def _route_ahead(agent: Self, graph: Graph) -> Lane:
     last = nearest + round(ROUTE_AHEAD_M / graph.cell_m(plan.map)) + 1
 
     ahead_m = route_m[nearest:last]
-    lane = Lane(ahead_m, _directions_rad(ahead_m))
-    return lane.where(_is_straight(lane) & _is_road(ahead_m, plan.map, graph))
-
-
-def _directions_rad(positions_m: Floats) -> Floats:
-    """(n,): the direction of a line at each of its (n, 2) points."""
-    number = np.arange(len(positions_m))
-    last = len(positions_m) - 1
-    before_m = positions_m[(number - ROUTE_PLACES).clip(0)]
-    after_m = positions_m[(number + ROUTE_PLACES).clip(max=last)]
-
+    number = np.arange(len(ahead_m))
+    before_m = ahead_m[(number - ROUTE_PLACES).clip(0)]
+    after_m = ahead_m[(number + ROUTE_PLACES).clip(max=len(ahead_m) - 1)]
     forwards_m, leftwards_m = (after_m - before_m).T
-    direction_rad: Floats = np.arctan2(leftwards_m, forwards_m)
-    return direction_rad
+    lane = Lane(ahead_m, np.arctan2(leftwards_m, forwards_m))
 
-
-def _is_road(positions_m: Floats, map_id: str, graph: Graph) -> Booleans:
-    """(n,): whether road was seen at (n, 2) positions."""
-    cells = np.rint(positions_m / graph.cell_m(map_id)).astype(np.int64)
+    cells = np.rint(ahead_m / graph.cell_m(plan.map)).astype(np.int64)
     lower = cells.min(axis=0)
     upper = cells.max(axis=0) + 1
     around = Extent(tuple(lower.tolist()), tuple(upper.tolist()))
-
-    window = graph.places.window(map_id, [PlaceColumn.ROAD], around)
+    window = graph.places.window(plan.map, [PlaceColumn.ROAD], around)
     i, j = (cells - lower).T
-    is_road: Booleans = window.column(PlaceColumn.ROAD)[i, j] >= ROAD_FROM
-    return is_road
+    is_road = window.column(PlaceColumn.ROAD)[i, j] >= ROAD_FROM
+    return lane.where(_is_straight(lane) & is_road)
 
 
 def _is_straight(lane: Lane) -> Booleans:
-    """(n,): where a lane is straight."""
+    """(n,): at which of its places a lane is straight."""
     along_m = distances_along(lane.position_m)
     is_straight = np.ones(len(along_m), bool)
     for away_m in STRAIGHT_M:
@@ -99,6 +82,6 @@ def _is_straight(lane: Lane) -> Booleans:
         last = np.searchsorted(along_m, along_m + away_m, side="right") - 1
         for there in (first, last):
             turned_rad = np.abs(wrap_angle(lane.heading_rad[there] - lane.heading_rad))
-            is_straight &= turned_rad <= LARGEST_TURN_RAD
+            is_straight &= turned_rad <= MAX_TURN_RAD
 
     return is_straight

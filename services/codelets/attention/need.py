@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
+
+import msgspec
+from msgspec import Meta
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.schemas import nodes
+from cogmap.schemas.base import PositiveShare
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Phase
@@ -24,19 +29,28 @@ from cogmap.schemas.nodes import (
     object_id,
 )
 from cogmap.services.codelets.attention.coalitions import coalition, felt
-from cogmap.services.codelets.attention.config import SECTION, Config, Need
-from cogmap.services.codelets.attention.memory import brought, is_refractory, memory_of
+from cogmap.services.codelets.attention.pending import brought, is_refractory, memory_of
 
 NAME = "need"
+SECTION = NAME
+# A need lasts for minutes: once a second is enough.
+REFRACTORY_CYCLES = 4
+
+
+class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """When a need is high."""
+
+    high_level: Annotated[
+        PositiveShare, Meta(description="Level from which on a need is high, above 0 to 1.")
+    ] = 0.5
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task where a need is high, and it does not wait."""
-    settings = config.need
-    if is_refractory(NAME, graph, context.cycle, settings.refractory_cycles):
+    """One task if a need is high, and the codelet does not wait."""
+    if is_refractory(NAME, graph, context.cycle, REFRACTORY_CYCLES):
         return []
 
-    high = high_needs(graph, settings)
+    high = high_needs(graph, config)
     if not high:
         return []
 
@@ -45,10 +59,10 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """A coalition of the self, the needs that are high, each as bad as its level where it has no
+    """A coalition of the self, the needs that are high, each as bad as its level if it has no
     salience of its own, and the nearest object that satisfies each.
     """
-    high = high_needs(graph, config.need)
+    high = high_needs(graph, config)
     agent = graph.agent
     if not high or agent is None:
         return Answer()
@@ -60,7 +74,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         if satisfying is not None:
             content.append(felt(satisfying, node.level))
 
-    found = coalition(NAME, content, graph, config.need.base_level, feeling=Feeling.NEED)
+    found = coalition(NAME, content, graph, feeling=Feeling.NEED)
     return brought(memory_of(NAME, graph), found, task.cycle, graph)
 
 
@@ -76,9 +90,9 @@ CODELET = Codelet(
 )
 
 
-def high_needs(graph: Graph, settings: Need) -> list[nodes.Need]:
+def high_needs(graph: Graph, config: Config) -> list[nodes.Need]:
     """The needs that are high, by id."""
-    return [node for node in graph.of_kind(nodes.Need) if node.level >= settings.high_level]
+    return [node for node in graph.of_kind(nodes.Need) if node.level >= config.high_level]
 
 
 def nearest_that_satisfies(need: nodes.Need, agent: Self, graph: Graph) -> Object | None:

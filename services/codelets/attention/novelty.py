@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import msgspec
+from msgspec import Meta
 
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
@@ -12,20 +15,33 @@ from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.attention.coalitions import coalition, objects_in_view
-from cogmap.services.codelets.attention.config import SECTION, Config, Novelty
-from cogmap.services.codelets.attention.memory import brought, is_refractory, memory_of
+from cogmap.services.codelets.attention.pending import brought, is_refractory, memory_of
 
 NAME = "novelty"
+SECTION = NAME
+
+
+class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """What is new to the agent."""
+
+    novel_sightings: Annotated[
+        int,
+        Meta(
+            ge=1,
+            le=10_000,
+            description="Views in which an object has been seen at most while it is new, 1 to "
+            "10000.",
+        ),
+    ] = 5
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task where an object in view has been seen in few views, and it does not wait."""
-    settings = config.novelty
-    if is_refractory(NAME, graph, context.cycle, settings.refractory_cycles):
+    """One task if an object in view has been seen in few views, and the codelet does not wait."""
+    if is_refractory(NAME, graph, context.cycle):
         return []
 
     percepts = context.percepts.objects
-    if not novel_objects(percepts, graph, settings):
+    if not novel_objects(percepts, graph, config):
         return []
 
     return [context.task(NAME, about=[SELF_ID], percepts=percepts)]
@@ -33,15 +49,12 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
     """A coalition of the self and the novel objects in view."""
-    novel = novel_objects(task.percepts, graph, config.novelty)
+    novel = novel_objects(task.percepts, graph, config)
     if not novel or graph.agent is None:
         return Answer()
 
     nodes: list[AnyNode] = [graph.agent, *novel]
-    base_level = config.novelty.base_level
-    found = coalition(
-        NAME, nodes, graph, base_level, percepts=task.percepts, feeling=Feeling.NOVELTY
-    )
+    found = coalition(NAME, nodes, graph, percepts=task.percepts, feeling=Feeling.NOVELTY)
     return brought(memory_of(NAME, graph), found, task.cycle, graph)
 
 
@@ -57,12 +70,12 @@ CODELET = Codelet(
 )
 
 
-def novel_objects(percepts: list[Percept], graph: Graph, settings: Novelty) -> list[Object]:
+def novel_objects(percepts: list[Percept], graph: Graph, config: Config) -> list[Object]:
     """The objects in view that were seen in few views, each as salient as it was seen little."""
     found = []
     for node in objects_in_view(percepts, graph):
-        if node.sightings <= settings.novel_sightings:
-            salience = 1.0 - node.sightings / (settings.novel_sightings + 1)
+        if node.sightings <= config.novel_sightings:
+            salience = 1.0 - node.sightings / (config.novel_sightings + 1)
             found.append(msgspec.structs.replace(node, salience=salience))
 
     return found

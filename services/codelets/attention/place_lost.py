@@ -5,14 +5,13 @@ from __future__ import annotations
 import msgspec
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self, object_id
 from cogmap.services.codelets.attention.coalitions import coalition, felt
-from cogmap.services.codelets.attention.config import SECTION, Config
-from cogmap.services.codelets.attention.memory import (
+from cogmap.services.codelets.attention.pending import (
     brought,
     is_refractory,
     kept,
@@ -26,23 +25,23 @@ NAME = "place_lost"
 LOST = "lost"
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
     """One task while the agent is lost, and until consciousness has it that it is found again."""
     agent = graph.agent
     if agent is None:
         return []
-    if is_refractory(NAME, graph, context.cycle, config.place_lost.refractory_cycles):
+    if is_refractory(NAME, graph, context.cycle):
         return []
 
     memory = memory_of(NAME, graph)
-    is_known = (LOST in memory.noted) == agent.is_lost and not memory.pending
-    if is_known and not agent.is_lost:
+    is_known = (LOST in memory.noted) == agent.misfits.is_lost and not memory.pending
+    if is_known and not agent.misfits.is_lost:
         return []
 
     return [context.task(NAME, about=[SELF_ID])]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """A coalition of the self, and of the landmark that did not fit first while it is lost: it is
     bad to be lost, and good to be found.
     """
@@ -52,25 +51,20 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     memory = without_conscious(memory_of(NAME, graph))
     was_lost = LOST in memory.noted
-    if was_lost != agent.is_lost:
-        noted = {LOST: task.cycle} if agent.is_lost else {}
+    if was_lost != agent.misfits.is_lost:
+        noted = {LOST: task.cycle} if agent.misfits.is_lost else {}
         memory = with_pending(msgspec.structs.replace(memory, noted=noted), [SELF_ID])
-    if not memory.pending and not agent.is_lost:
+    if not memory.pending and not agent.misfits.is_lost:
         return kept(memory, graph)
 
-    base_level = config.place_lost.base_level
-    if agent.is_lost:
-        content: list[AnyNode] = [agent, *_misfits(agent, graph)]
+    if agent.misfits.is_lost:
+        content: list[AnyNode] = [agent]
+        content += nodes_of(graph, Object, [object_id(agent.misfits.label)])
         bad = [felt(node, -1.0) for node in content]
-        found = coalition(NAME, bad, graph, base_level, feeling=Feeling.LOST)
+        found = coalition(NAME, bad, graph, feeling=Feeling.LOST)
     else:
-        found = coalition(NAME, [felt(agent, 1.0)], graph, base_level)
+        found = coalition(NAME, [felt(agent, 1.0)], graph)
     return brought(memory, found, task.cycle, graph)
-
-
-def _misfits(agent: Self, graph: Graph) -> list[Object]:
-    """The landmark that did not fit first, where the map has it."""
-    return nodes_of(graph, Object, [object_id(agent.first_misfit)])
 
 
 CODELET = Codelet(
@@ -80,6 +74,4 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Self, Object, Attention}),
     writes=frozenset({Attention}),
-    config=Config,
-    section=SECTION,
 )

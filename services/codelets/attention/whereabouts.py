@@ -1,30 +1,28 @@
 """The default attention codelet: where the agent is among what it sees, the most active content of
 the Current Situational Model.
+
+Without it nothing would be conscious wherever nothing happens, and no action chosen: so it has no
+refractory period, where LIDA's attention codelets have one of 50 ticks.
 """
 
 from __future__ import annotations
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import Phase
-from cogmap.schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self
+from cogmap.schemas.nodes import SELF_ID, AnyNode, Object, Self
 from cogmap.services.codelets.attention.coalitions import coalition, objects_in_view
-from cogmap.services.codelets.attention.config import SECTION, Config
-from cogmap.services.codelets.attention.memory import brought, is_refractory, memory_of
 
 NAME = "whereabouts"
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task in each cycle in which it does not wait."""
-    if is_refractory(NAME, graph, context.cycle, config.whereabouts.refractory_cycles):
-        return []
-
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
+    """One task in each cycle."""
     return [context.task(NAME, about=[SELF_ID], percepts=context.percepts.objects)]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """A coalition of the self and the objects in view."""
     nodes: list[AnyNode] = []
     if graph.agent is not None:
@@ -33,11 +31,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if not nodes:
         return Answer()
 
-    base_level = config.whereabouts.base_level
-    found = coalition(NAME, nodes, graph, base_level, percepts=task.percepts)
-    if not config.whereabouts.refractory_cycles:
-        return Answer(coalitions=[found])
-    return brought(memory_of(NAME, graph), found, task.cycle, graph)
+    return Answer(coalitions=[coalition(NAME, nodes, graph, percepts=task.percepts)])
 
 
 CODELET = Codelet(
@@ -45,8 +39,6 @@ CODELET = Codelet(
     phase=Phase.ATTENTION,
     due=due,
     run=run,
-    reads=frozenset({Self, Object, Attention}),
-    writes=frozenset({Attention}),
-    config=Config,
-    section=SECTION,
+    reads=frozenset({Self, Object}),
+    writes=frozenset(),
 )

@@ -15,7 +15,7 @@ from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import mean_pose, move_with, wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import DropNode, Link, Operation, Phase
@@ -34,7 +34,6 @@ from cogmap.schemas.nodes import (
     is_coarse_map,
     nearest_place,
 )
-from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.correction.place_columns import MOVED_COLUMNS, move_places
 from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import POSE, STAMP, with_rows
@@ -45,7 +44,7 @@ OLD_POSITION = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_Y_M + 1)
 BESIDE_M = 10.0
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
     """One task where a correction waits to be applied."""
     if CORRECTION_ID not in graph.nodes:
         return []
@@ -54,7 +53,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     return [task]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """Move everything on the map as the correction states, and forget the correction."""
     correction = graph.get(Correction, CORRECTION_ID)
     if correction is None:
@@ -85,8 +84,6 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Correction, PathSegment, Observations, Self, Object, Map, *MOVED_COLUMNS}),
     writes=frozenset({Correction, PathSegment, Self, Object, Map, LinkKind.AT, *MOVED_COLUMNS}),
-    config=Config,
-    section=SECTION,
 )
 
 

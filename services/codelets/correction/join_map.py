@@ -14,7 +14,7 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import DropNode, Operation, Phase
@@ -35,7 +35,6 @@ from cogmap.schemas.nodes import (
     Recollection,
     Self,
 )
-from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.correction.apply_correction import moved
 from cogmap.services.codelets.correction.place_columns import MOVED_COLUMNS
 from cogmap.services.codelets.correction.recalled_objects import recalled_objects
@@ -43,14 +42,14 @@ from cogmap.services.codelets.correction.recalled_places import recalled_places
 from cogmap.services.codelets.correction.recalled_sub_maps import recalled_sub_maps
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
     """One task where a recalled map waits to be joined, and no correction to be applied."""
     if RECOLLECTION_ID not in graph.nodes or CORRECTION_ID in graph.nodes:
         return []
     return [context.task(CODELET.name, about=[RECOLLECTION_ID])]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """Move what is known into the recalled map's frame, and add the recalled map to it."""
     recalled = graph.get(Recollection, RECOLLECTION_ID)
     root = graph.get(Map, ROOT_MAP)
@@ -80,8 +79,6 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({*MOVED, Recollection, Observations, LinkKind.WITHIN, *MOVED_COLUMNS}),
     writes=frozenset({*MOVED, Recollection, LinkKind.AT, LinkKind.WITHIN, *MOVED_COLUMNS}),
-    config=Config,
-    section=SECTION,
 )
 
 

@@ -8,12 +8,16 @@ import numpy as np
 
 from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pose_graph import PoseGraph
-from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import FULL_TURN_RAD
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.mapping.observations import Sightings
 
 ROUNDS = 5
+# Sides of a building whose views share an error, and successive sightings of one along the path
+# whose errors are alike, so that together they count as one.
+SIDES = 16
+CORRELATED = 5.0
 
 
 def optimize_jointly(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
@@ -23,17 +27,20 @@ def optimize_jointly(graph: PoseGraph, seen: Sightings, config: Config) -> tuple
     Where a landmark seems to be depends on the side that it is seen from: of a building the front
     is measured, and its depth assumed. So each of its sides is taken for a landmark of its own,
     which binds one pass to the next past the same side, and bends neither. Sightings in a row err
-    alike: `config.correlated_sightings` of them count as one.
+    alike: CORRELATED of them count as one. Points have one side, and their sightings err
+    independently.
     """
     poses = optimize(graph)
     if not len(seen.place):
         return poses, 1
 
-    sides = by_side(seen, poses, config.landmark_sides)
+    are_points = config.landmarks == "points"
+    sides = by_side(seen, poses, 1 if are_points else SIDES)
+    correlated = 1.0 if are_points else CORRELATED
     landmarks_m = sides.landmarks_m(poses)
     for _ in range(ROUNDS):
         path = replace(graph, poses=poses)
-        joint = with_landmarks(path, sides, landmarks_m, config.correlated_sightings)
+        joint = with_landmarks(path, sides, landmarks_m, correlated)
         optimized = optimize(joint)
         poses = optimized[: len(poses)]
         landmarks_m = optimized[len(poses) :, :2]
@@ -64,23 +71,12 @@ def by_side(seen: Sightings, poses: Floats, sides: int) -> Sightings:
     """The same sightings with a landmark for each of so many sides, by the direction in which the
     landmark is seen in the world.
     """
-    side = _sides(seen, poses, sides)
+    forward_m, left_m = seen.where_m.T
+    direction_rad = poses[seen.place, 2] + np.arctan2(left_m, forward_m)
+    side = np.rint(direction_rad / FULL_TURN_RAD * sides).astype(np.int64) % sides
     key = seen.landmark * sides + side
     keys, landmark = np.unique(key, return_inverse=True)
 
     numbers = keys // sides
     labels = [seen.labels[number] for number in numbers.tolist()]
     return seen._replace(labels=tuple(labels), landmark=landmark)
-
-
-def _sides(seen: Sightings, poses: Floats, sides: int) -> Indices:
-    """(m,): from which side each sighting is, 0 to `sides` - 1."""
-    heading_rad = poses[seen.place, 2]
-    forward_m, left_m = seen.where_m.T
-    bearing_rad = np.arctan2(left_m, forward_m)
-
-    direction_rad = heading_rad + bearing_rad
-    turns = direction_rad / FULL_TURN_RAD
-    sector = np.rint(turns * sides).astype(np.int64)
-    side: Indices = sector % sides
-    return side

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import mean_pose, wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
@@ -28,52 +27,36 @@ from cogmap.schemas.nodes import (
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.localization.measurement_model import (
+    FARTHEST_M,
+    GATE,
     MIN_SIGHTINGS,
     is_seen_from_here,
 )
 from cogmap.services.codelets.localization.motion_model import with_gains
 from cogmap.services.codelets.localization.sampling import (
-    Samples,
     generator,
     rejection_mask,
     resample,
     spread,
 )
 
+# Few samples represent all positions between them, as far apart as three of their mean gaps.
 GAP = 3.0
 LOCAL_SHARE = 0.5
 MIN_RANGE_M = 0.1
+# Successive misfits after which a landmark is placed anew.
+MISSES = 8
+# An object that was seen twice is remembered for about the time until it may be seen again.
 CONFIRMED_BASE_LEVEL = 0.15
-
-
-class Record(NamedTuple):
-    """In how many views a landmark was seen where it is believed to be, and in how many in a row it
-    was seen elsewhere since.
-    """
-
-    sightings: int
-    misses: int
-
-
-FIRST = Record(1, 0)
-
-
-class Seen(NamedTuple):
-    """A percept, and the object that it is of."""
-
-    percept: Percept
-    node: Object
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task for all objects in view that the map has."""
-    known = []
-    for percept in sorted(context.percepts.objects, key=lambda percept: percept.label):
-        if object_id(percept.label) in graph.nodes:
-            known.append(percept)
-
+    by_label = sorted(context.percepts.objects, key=lambda percept: percept.label)
+    known = [percept for percept in by_label if object_id(percept.label) in graph.nodes]
     if not known:
         return []
+
     about = [SELF_ID, *(object_id(percept.label) for percept in known)]
     return [context.task(CODELET.name, about, percepts=known)]
 
@@ -82,7 +65,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     """Eq. 4 for each percept of `task` and its landmark: keep the samples that agree with what is
     seen now.
 
-    A landmark that disagrees in `config.misses` views in a row, or in more than it ever agreed
+    A landmark that disagrees in MISSES views in a row, or in more than it ever agreed
     with, stands elsewhere: it starts anew from what is seen, once it is certain that the agent is
     not elsewhere. While the agent stands still and sees the same again, landmarks stay where they
     are; those that were surveyed always do.
@@ -97,8 +80,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         if landmark is None:
             raise MessageError(f"task {task.task_id}: the graph lacks {percept.label}")
 
-        seen = Seen(percept, landmark)
-        answer.operations.extend(_updated(seen, agent, task, graph, config))
+        after = updated(landmark, percept, agent, task, config)
+        answer.operations.extend(refreshed(landmark, after, percept, task, graph))
 
     return answer
 
@@ -115,37 +98,40 @@ CODELET = Codelet(
 )
 
 
-def _updated(seen: Seen, agent: Self, task: Task, graph: Graph, config: Config) -> list[Operation]:
-    """A landmark after the view of `task`, and its link to the place there."""
-    percept, landmark = seen
-    before = landmark.positions_m()
-    record = Record(landmark.sightings, landmark.misses)
-    if _stays(agent, landmark):
-        return _refreshed(seen, task, graph, record)
+def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config: Config) -> Object:
+    """A landmark with the positions that agree with the view of `task`, and in how many views it
+    agreed, or in how many in a row it did not.
+    """
+    is_same_view = is_seen_from_here(landmark, agent.stationary_since_ns)
+    if landmark.surveyed or agent.misfits.is_lost or is_same_view:
+        return landmark
 
     rng = generator(f"{task.task_id}/{percept.label}")
+    before = landmark.positions_m()
     selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
     selves = rng.permutation(resample(selves, len(before), 0.0, rng))
     mahalanobis2 = _mahalanobis2(before, selves, percept)
-    if mahalanobis2.min() < config.gate**2:
+    if mahalanobis2.min() < GATE**2:
         log_likelihood = -mahalanobis2 / 2 / config.correlated_views
         kept = before[rejection_mask(log_likelihood, rng)]
-        after = resample(kept, len(before), _jitter_m(kept, config), rng)
-        record = Record(record.sightings + 1, 0)
-        return located(seen, task, graph, after, record)
+        # Of a ring or a ray, the next view must find some between the samples that are kept.
+        gaps_m = GAP * spread(kept, kept.mean(axis=0)) / len(kept)
+        jitter_m = np.maximum(config.landmark_jitter_m, gaps_m)
+        fitting = msgspec.structs.replace(landmark, sightings=landmark.sightings + 1, misses=0)
+        return with_positions(fitting, resample(kept, len(before), jitter_m, rng))
 
-    misses = record.misses + 1
-    is_patient = misses < min(config.misses, record.sightings + 1)
-    if is_patient or _may_be_elsewhere(agent, task.stamp_ns):
-        record = Record(record.sightings, misses)
-        return _refreshed(seen, task, graph, record)
+    # That the agent is nowhere else must have been found before this view.
+    fit = agent.misfits
+    may_be_elsewhere = fit.count > 0 and not NEVER_NS < fit.not_elsewhere_ns < task.stamp_ns
+    misses = landmark.misses + 1
+    if may_be_elsewhere or misses < min(MISSES, landmark.sightings + 1):
+        return msgspec.structs.replace(landmark, misses=misses)
 
-    anew = msgspec.structs.replace(landmark, created_ns=task.stamp_ns)
-    positions_m = first_positions(selves, percept, config, rng)
-    return located(Seen(percept, anew), task, graph, positions_m, FIRST)
+    anew = msgspec.structs.replace(landmark, sightings=1, misses=0, created_ns=task.stamp_ns)
+    return with_positions(anew, first_positions(selves, percept, rng))
 
 
-def nearby_selves(selves: Samples, config: Config) -> Samples:
+def nearby_selves(selves: Floats, config: Config) -> Floats:
     """(n, 7) samples of the self for placing landmarks relative to it, which is known however lost
     the agent is.
 
@@ -167,13 +153,11 @@ def nearby_selves(selves: Samples, config: Config) -> Samples:
     return np.hstack([poses, selves[:, POSE_COLUMNS:]])
 
 
-def first_positions(
-    selves: Samples, percept: Percept, config: Config, rng: np.random.Generator
-) -> Samples:
+def first_positions(selves: Floats, percept: Percept, rng: np.random.Generator) -> Floats:
     """(n, 2) samples of where an object may be that is seen for the first time from (n, 7) samples
     of the self.
 
-    Seen by range alone it is on a ring, by bearing alone on a ray as long as `config.farthest_m`.
+    Seen by range alone it is on a ring, by bearing alone on a ray as long as FARTHEST_M.
     """
     number = len(selves)
 
@@ -187,97 +171,57 @@ def first_positions(
         seen_m = rng.normal(percept.range_m, percept.range_sd_m, number).clip(MIN_RANGE_M)
         distance_m = seen_m / (1 + selves[:, SelfColumn.RANGE_GAIN])
     else:
-        distance_m = rng.uniform(0.0, config.farthest_m, number)
+        distance_m = rng.uniform(0.0, FARTHEST_M, number)
 
     direction = np.column_stack([np.cos(direction_rad), np.sin(direction_rad)])
-    positions_m: Samples = selves[:, :2] + distance_m[:, None] * direction
+    positions_m: Floats = selves[:, :2] + distance_m[:, None] * direction
     return positions_m
 
 
-def located(
-    seen: Seen, task: Task, graph: Graph, positions_m: Samples, record: Record
-) -> list[Operation]:
-    """The object with new samples, refreshed by the percept in the view of `task`, and its link to
-    the place of their mean.
-    """
+def with_positions(node: Object, positions_m: Floats) -> Object:
+    """The object with other samples of its position, (n, 2)."""
     mean = positions_m.mean(axis=0)
     sd = spread(positions_m, mean)
-    moved = msgspec.structs.replace(
-        seen.node,
+    return msgspec.structs.replace(
+        node,
         x_m=float(mean[0]),
         y_m=float(mean[1]),
         x_sd_m=float(sd[0]),
         y_sd_m=float(sd[1]),
         offsets_m=Matrix.of(positions_m - mean, "<f2"),
     )
-    return _refreshed(Seen(seen.percept, moved), task, graph, record)
 
 
-def _refreshed(seen: Seen, task: Task, graph: Graph, record: Record) -> list[Operation]:
-    """The object refreshed by the percept in the view of `task`, its position as it is, and its
-    link to the place there. Being seen excites its activation; but for the second view, its base
-    level is learned by consciousness alone.
+def refreshed(
+    before: Object, after: Object, percept: Percept, task: Task, graph: Graph
+) -> list[Operation]:
+    """The object, which was as `before`, refreshed by the percept in the view of `task`, and its
+    link to the place there.
+
+    Being seen excites its activation. Its base level is learned by consciousness, but that a second
+    view confirms the first: until then a new object may be a mistake, and is forgotten as soon as
+    it is neither in view nor conscious.
     """
-    percept, node = seen
-    refreshed = msgspec.structs.replace(
-        node,
-        function=percept.function or node.function,
+    base_level = graph.base_level(before)
+    is_confirmed = before.sightings < MIN_SIGHTINGS <= after.sightings
+    if is_confirmed and base_level < CONFIRMED_BASE_LEVEL:
+        base_level += CONFIRMED_BASE_LEVEL
+
+    node = msgspec.structs.replace(
+        after,
+        function=percept.function or before.function,
         activation=percept.activation,
-        base_level=_base_level(node, record, graph),
+        base_level=base_level,
         cycle=task.cycle,
         width_m=percept.width_m,
         height_m=percept.height_m,
-        sightings=record.sightings,
-        misses=record.misses,
         last_seen_ns=task.stamp_ns,
     )
-    cell_m = graph.cell_m(node.map)
-    place = nearest_place(node.x_m, node.y_m, cell_m, node.map)
-    return [refreshed, Link(source=node.id, target=place, kind=LinkKind.AT)]
+    place = nearest_place(node.x_m, node.y_m, graph.cell_m(node.map), node.map)
+    return [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
 
 
-def _base_level(node: Object, record: Record, graph: Graph) -> float:
-    """The base level of an object now, which rises where a second view confirms the first.
-
-    Until then a new object may be a mistake, and is forgotten as soon as it is neither in view nor
-    conscious.
-    """
-    level = graph.base_level(node)
-    is_confirmed = node.sightings < MIN_SIGHTINGS <= record.sightings
-    if is_confirmed and level < CONFIRMED_BASE_LEVEL:
-        return level + CONFIRMED_BASE_LEVEL
-    return level
-
-
-def _jitter_m(kept: Samples, config: Config) -> Samples:
-    """The standard deviations of the noise that resampling adds to (n, 2) samples.
-
-    Few samples represent all positions between them: of a ring or a ray, the next view must find
-    some again.
-    """
-    sd_m = spread(kept, kept.mean(axis=0))
-    gaps_m = GAP * sd_m / len(kept)
-    jitter_m: Samples = np.maximum(config.landmark_jitter_m, gaps_m)
-    return jitter_m
-
-
-def _stays(agent: Self, landmark: Object) -> bool:
-    if landmark.surveyed or agent.is_lost:
-        return True
-
-    return is_seen_from_here(landmark, agent.stationary_since_ns)
-
-
-def _may_be_elsewhere(agent: Self, stamp_ns: int) -> bool:
-    """Whether nothing in view confirms where the agent is, and that it is nowhere else was not
-    found before the view at `stamp_ns`.
-    """
-    if not agent.misfit_count:
-        return False
-    return not NEVER_NS < agent.not_elsewhere_ns < stamp_ns
-
-
-def _mahalanobis2(positions_m: Samples, selves: Samples, percept: Percept) -> Samples:
+def _mahalanobis2(positions_m: Floats, selves: Floats, percept: Percept) -> Floats:
     """(n,): squared deviations of the percept from what each pair of landmark and self predicts."""
     offset_m = positions_m - selves[:, :2]
     mahalanobis2 = np.zeros(len(offset_m))

@@ -13,19 +13,22 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose, mean_pose, relative
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.codelets import Task
-from cogmap.schemas.graph import Link, Operation, Phase
+from cogmap.schemas.graph import Link, Phase
 from cogmap.schemas.nodes import (
     NEVER_NS,
     POSE_COLUMNS,
     SELF_ID,
     LinkKind,
+    Misfits,
     Object,
     Observations,
+    PathIntegration,
     PathSegment,
     Self,
     SelfColumn,
@@ -33,7 +36,12 @@ from cogmap.schemas.nodes import (
     object_id,
 )
 from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.localization.information import (
+    new_share,
+    variances_when_placed,
+)
 from cogmap.services.codelets.localization.measurement_model import (
+    GATE,
     Sighting,
     compare,
     log_likelihood,
@@ -43,24 +51,23 @@ from cogmap.services.codelets.localization.misfits import (
     Estimate,
     inflated,
     misfit,
+    recent_percepts,
     relocalized,
-    seen_of_late,
 )
 from cogmap.services.codelets.localization.motion_model import dead_reckon, move, with_gains
-from cogmap.services.codelets.localization.novelty import novelty, variances_when_placed
 from cogmap.services.codelets.localization.recovery import relocalize_heading
 from cogmap.services.codelets.localization.sampling import (
-    Samples,
     centred,
     generator,
     rejection_resample,
     resample,
     tempering_exponent,
 )
-from cogmap.services.codelets.mapping.path import odometry_of, variances_of
 
+# Three stages reach a likelihood that keeps one sample in 64 of those that would be kept at once.
 STAGES = 3
-# Headings a radian apart, and those whose mean direction is no longer than that of a spread of one.
+# Headings this far apart whose mean direction is shorter than ALIKE, that of a spread of one
+# radian, may be any.
 TURNED_RAD = 1.0
 ALIKE = 0.6
 FORGOTTEN_NS = 20_000_000_000
@@ -69,21 +76,16 @@ FORGOTTEN_NS = 20_000_000_000
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task in each cycle."""
     percepts = context.percepts.objects
-    about = [SELF_ID]
-    for label in sorted(percept.label for percept in percepts):
-        name = object_id(label)
-        if name in graph.nodes:
-            about.append(name)
-
-    task = context.task(CODELET.name, about, percepts=percepts, with_motions=True)
-    return [task]
+    seen = [object_id(label) for label in sorted(percept.label for percept in percepts)]
+    about = [SELF_ID, *(name for name in seen if name in graph.nodes)]
+    return [context.task(CODELET.name, about, percepts=percepts, with_motions=True)]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
     """Move the self node's samples, correct them by the landmarks in view, and link it to its new
     place.
 
-    Where the paper restarts each step from the mean of the samples, these continue from the samples
+    The paper restarts each step from the mean of the samples. These continue from the samples
     themselves: what the agent does not know of its heading now, it must still not know when it
     comes to matter.
     """
@@ -95,45 +97,54 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     motions = np.asarray(task.motions.numpy(), np.float64)
     before = with_gains(agent.samples.numpy(), config, rng)
     moved = move(resample(before, config.samples, 0.0, rng), motions, config, rng)
-
-    stationary_since_ns = _stationary_since(agent, bool(motions[:, :2].any()))
-    seen = sightings(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
     moved_sd = motions[:, 3:5] * motions[:, 2:3]
-    variances = variances_of(agent) + np.square(moved_sd).sum(axis=0)
+    variances = agent.odometry.variances() + np.square(moved_sd).sum(axis=0)
 
-    found = _past(agent, moved, task.stamp_ns)
+    stationary_since_ns = NEVER_NS
+    if not motions[:, :2].any():
+        stationary_since_ns = agent.stationary_since_ns
+        if stationary_since_ns == NEVER_NS:
+            stationary_since_ns = max(0, agent.stamp_ns)
+
+    # Misfits are forgotten once none has followed for long.
+    found = Estimate(moved)
+    if task.stamp_ns <= agent.misfits.last_ns + FORGOTTEN_NS:
+        before_it = agent.misfits
+        found = Estimate(moved, 1.0, before_it.count, before_it.label, before_it.is_lost)
+
+    seen = sightings(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
     if seen is not None:
         since = variances - variances_when_placed(graph, seen)
-        weights = novelty(moved, seen, since) / config.correlated_views
-        found = _correct(found, seen, weights, config, rng)
-        found = inflated(found, _path_sd_m(agent, variances), rng)
+        weights = new_share(moved, seen, since) / config.correlated_views
+        found = correct(found, seen, weights, config, rng)
+        found = inflated(found, _path_sd_m(agent.odometry, variances), rng)
 
     gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
-    odometry = dead_reckon(odometry_of(agent), motions, gains)
+    odometry = dead_reckon(agent.odometry.pose(), motions, gains)
     if seen is not None and found.misfit_count:
-        percepts = seen_of_late(found, task, graph, odometry)
+        percepts = recent_percepts(found, task, agent, graph, odometry)
         found = relocalized(found, percepts, graph, config, rng)
 
     if found.was_kidnapped:
         # Self-motion did not measure the kidnapping: the step there counts as one that was driven,
         # as certain as the pose that was found.
-        step = relative(mean_pose(moved), mean_pose(found.samples))
-        odometry = compose(odometry, step)
+        odometry = compose(odometry, relative(mean_pose(moved), mean_pose(found.samples)))
         _, offsets = centred(found.samples)
-        found_variances = np.square(offsets).mean(axis=0)
-        variances += found_variances[1:POSE_COLUMNS]
+        variances += np.square(offsets).mean(axis=0)[1:POSE_COLUMNS]
 
-    estimate = _self_node(task, agent, found)
     after = msgspec.structs.replace(
-        estimate,
+        _self_node(task, agent, found),
         stationary_since_ns=stationary_since_ns,
-        odometry_x_m=float(odometry[0]),
-        odometry_y_m=float(odometry[1]),
-        odometry_heading_rad=float(odometry[2]),
-        odometry_variance_m2=float(variances[0]),
-        odometry_variance_rad2=float(variances[1]),
+        odometry=PathIntegration(
+            x_m=float(odometry[0]),
+            y_m=float(odometry[1]),
+            heading_rad=float(odometry[2]),
+            variance_m2=float(variances[0]),
+            variance_rad2=float(variances[1]),
+        ),
     )
-    return Answer(_operations(after, graph))
+    place = nearest_place(after.x_m, after.y_m, graph.cell_m(after.map), after.map)
+    return Answer([after, Link(source=after.id, target=place, kind=LinkKind.AT)])
 
 
 CODELET = Codelet(
@@ -148,57 +159,31 @@ CODELET = Codelet(
 )
 
 
-def _stationary_since(agent: Self, moves: bool) -> int:
-    """The stamp at which the agent stopped; NEVER_NS where it moves."""
-    if moves:
-        return NEVER_NS
-
-    if agent.stationary_since_ns == NEVER_NS:
-        return max(0, agent.stamp_ns)
-    return agent.stationary_since_ns
-
-
-def _past(agent: Self, moved: Samples, stamp_ns: int) -> Estimate:
-    """The estimate before; misfits are forgotten where nothing has followed for long."""
-    forgotten_ns = agent.last_misfit_ns + FORGOTTEN_NS
-    if stamp_ns > forgotten_ns:
-        return Estimate(moved)
-
-    return Estimate(
-        moved,
-        misfit_count=agent.misfit_count,
-        first_misfit=agent.first_misfit,
-        is_lost=agent.is_lost,
-    )
-
-
-def _correct(
-    past: Estimate, seen: Sighting, weights: Samples, config: Config, rng: np.random.Generator
+def correct(
+    past: Estimate, seen: Sighting, weights: Floats, config: Config, rng: np.random.Generator
 ) -> Estimate:
     """Reject samples by what is in view, each landmark by its weight (k,).
 
-    Where most of that fits no sample, all are kept, until the agent must be elsewhere. Where
-    rejection would keep too few, it is done in stages: each by a part of the likelihood, the
-    product of all parts being the whole, from samples as many as before, drawn around those that
-    the stage before has kept. Stages cannot follow a heading that may be any: there the landmarks
-    determine which headings are tried.
+    If most of that fits no sample, all are kept, until the agent must be elsewhere. If rejection
+    would keep too few, it is done in stages: each by a part of the likelihood, the product of all
+    parts being the whole, from samples as many as before, drawn around those that the stage before
+    has kept. Stages cannot follow a heading that may be any: then the landmarks determine which
+    headings are tried.
     """
-    if _is_heading_unknown(past.samples[:, 2]) and seen.has_bearing.any():
-        turned = relocalize_heading(past.samples, seen, config, rng)
-        return Estimate(turned, 0.0)
+    if seen.has_bearing.any() and _is_heading_unknown(past.samples[:, 2]):
+        return Estimate(relocalize_heading(past.samples, seen, rng), 0.0)
 
     compared = compare(past.samples, seen)
-    is_fitting = compared.squared < config.gate**2
     counts = seen.weights.astype(np.float32)
-    fitting = (counts @ is_fitting).max()
+    fitting = (counts @ (compared.squared < GATE**2)).max()
     if 2 * fitting < counts.sum():
-        return misfit(past, seen, config)
+        return misfit(past, seen)
 
     samples = past.samples
     exponent_left = 1.0
     share = 1.0
     for stage in range(STAGES):
-        scores = log_likelihood(compared.density, config.outlier_share, weights)
+        scores = log_likelihood(compared.density, weights)
         exponent = exponent_left
         if stage < STAGES - 1:
             largest_step = tempering_exponent(scores, config.kept_samples / len(scores))
@@ -216,35 +201,43 @@ def _correct(
     return Estimate(kept, share)
 
 
-def _is_heading_unknown(headings_rad: Samples) -> bool:
-    """Whether the headings (n,) are so far apart that nearly any may be the agent's."""
+def _is_heading_unknown(headings_rad: Floats) -> bool:
+    """If the headings (n,) are so far apart that nearly any may be the agent's."""
     if np.ptp(headings_rad) <= TURNED_RAD:
         return False
 
     mean_x = np.cos(headings_rad).mean()
     mean_y = np.sin(headings_rad).mean()
-    mean_length = np.hypot(mean_x, mean_y)
-    return bool(mean_length < ALIKE)
+    return bool(np.hypot(mean_x, mean_y) < ALIKE)
 
 
-def _path_sd_m(agent: Self, variances: Samples) -> float:
-    """The standard deviation of where path integration alone would have the agent, by its
-    `variances` since the start, in m^2 and rad^2.
+def _path_sd_m(odometry: PathIntegration, variances: Floats) -> float:
+    """The standard deviation of the position by path integration alone, by its `variances` since
+    the start, in m^2 and rad^2.
     """
     variance_m2, variance_rad2 = variances.tolist()
-    away_m2 = agent.odometry_x_m**2 + agent.odometry_y_m**2
+    away_m2 = odometry.x_m**2 + odometry.y_m**2
     return math.sqrt(variance_m2 + variance_rad2 * away_m2)
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:
-    """The self node after localization; what path integration measured is as before."""
+    """The self node with the estimate after localization."""
     mean, offsets = centred(found.samples)
-    variance = np.einsum("nd,nd->d", offsets, offsets) / len(offsets)
-    sd = np.sqrt(variance)
+    sd = np.sqrt(np.einsum("nd,nd->d", offsets, offsets) / len(offsets))
     has_gains = bool(sd[POSE_COLUMNS:].any())
     samples = found.samples if has_gains else found.samples[:, :POSE_COLUMNS]
 
-    is_misfit = found.misfit_count > agent.misfit_count
+    past = agent.misfits
+    is_misfit = found.misfit_count > past.count
+    misfits = Misfits(
+        count=found.misfit_count,
+        label=found.first_misfit,
+        is_lost=found.is_lost,
+        last_ns=task.stamp_ns if is_misfit else past.last_ns,
+        last_fit_ns=past.last_fit_ns if found.misfit_count else task.stamp_ns,
+        not_elsewhere_ns=task.stamp_ns if found.is_not_elsewhere else past.not_elsewhere_ns,
+        found_ns=task.stamp_ns if found.was_kidnapped else past.found_ns,
+    )
     return msgspec.structs.replace(
         agent,
         activation=1.0,
@@ -258,22 +251,9 @@ def _self_node(task: Task, agent: Self, found: Estimate) -> Self:
         y_sd_m=float(sd[1]),
         heading_sd_rad=float(sd[2]),
         kept_share=found.share,
-        misfit_count=found.misfit_count,
-        first_misfit=found.first_misfit,
-        is_lost=found.is_lost,
-        last_misfit_ns=task.stamp_ns if is_misfit else agent.last_misfit_ns,
-        last_fit_ns=agent.last_fit_ns if found.misfit_count else task.stamp_ns,
-        not_elsewhere_ns=task.stamp_ns if found.is_not_elsewhere else agent.not_elsewhere_ns,
-        found_ns=task.stamp_ns if found.was_kidnapped else agent.found_ns,
         speed_gain=float(mean[SelfColumn.SPEED_GAIN]),
         turn_gain=float(mean[SelfColumn.TURN_GAIN]),
         range_gain=float(mean[SelfColumn.RANGE_GAIN]),
+        misfits=misfits,
         samples=Matrix.of(samples),
     )
-
-
-def _operations(agent: Self, graph: Graph) -> list[Operation]:
-    cell_m = graph.cell_m(agent.map)
-    place = nearest_place(agent.x_m, agent.y_m, cell_m, agent.map)
-    link = Link(source=agent.id, target=place, kind=LinkKind.AT)
-    return [agent, link]

@@ -16,8 +16,17 @@ from cogmap.schemas.nodes import NEVER_NS, Object, object_id
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.localization.motion_model import RANGE
 
+# A landmark informs that is known to this share of its distance.
 MAX_SD_SHARE = 0.5
 MIN_SIGHTINGS = 2
+# The distance up to which a landmark may stand that is seen by its bearing alone: no building is
+# recognised from farther.
+FARTHEST_M = 50.0
+# A percept farther from what a sample predicts does not fit it, in standard deviations: of normal
+# errors one in 16,000 is.
+GATE = 4.0
+# The share of percepts that may be of another landmark: names that are as good as sure.
+OUTLIER_SHARE = 1e-3
 # The evidence of a name that is as good as sure.
 SURE_EVIDENCE = 0.9
 FULL_TURN_RAD = np.float32(2 * np.pi)
@@ -81,7 +90,13 @@ def compare(samples: Floats, seen: Sighting) -> Comparison:
     mean position of the samples.
     """
     weights = np.full(len(samples), 1 / len(samples))
-    bearing_var, range_var = _variances(seen, seen.mean_m - weights @ samples[:, :2])
+    offset_m = seen.mean_m - weights @ samples[:, :2]
+    squared_m2 = np.maximum((offset_m**2).sum(axis=1), 1e-6)
+    total = np.trace(seen.covariance_m2, axis1=1, axis2=2)
+    radial = np.einsum("ka,kab,kb->k", offset_m, seen.covariance_m2, offset_m) / squared_m2
+    tangential = np.maximum(total - radial, 0.0)
+    bearing_var = seen.bearing_sd_rad**2 + tangential / squared_m2
+    range_var = seen.range_sd_m**2 + radial
 
     squared = _squared(samples, seen, bearing_var, range_var)
     density = np.exp(np.minimum(squared, MAX_MAHALANOBIS2) / -2)
@@ -116,47 +131,26 @@ def _squared(samples: Floats, seen: Sighting, bearing_var: Floats, range_var: Fl
     return np.add(bearing, distance, out=distance)
 
 
-def _variances(seen: Sighting, offset_m: Floats) -> tuple[Floats, Floats]:
-    """(k,) variances of bearing and of range, landmarks being at (k, 2) offsets from the agent."""
-    squared_m2 = np.maximum((offset_m**2).sum(axis=1), 1e-6)
-
-    total = np.trace(seen.covariance_m2, axis1=1, axis2=2)
-    radial = np.einsum("ka,kab,kb->k", offset_m, seen.covariance_m2, offset_m) / squared_m2
-    tangential = np.maximum(total - radial, 0.0)
-
-    bearing_var = seen.bearing_sd_rad**2 + tangential / squared_m2
-    range_var = seen.range_sd_m**2 + radial
-    return bearing_var, range_var
-
-
 def _single(numbers: Floats) -> Singles:
     return numbers.astype(np.float32)
 
 
-def log_likelihood(density: Singles, outlier: float, weights: Floats | None = None) -> Floats:
+def log_likelihood(density: Singles, weights: Floats | None = None) -> Floats:
     """(n,): the logarithm of the product over landmarks of p(o_j | l_j, x), from (k, n) densities
     (eq. 1), each to the power of its weight (k,), or of 1.
 
-    `outlier` is the share of percepts that may mean anything, so that a landmark taken for another
-    outvotes nobody.
+    OUTLIER_SHARE of the percepts may mean anything, so that a landmark taken for another does not
+    outvote the rest.
     """
-    terms = np.log((1 - outlier) * density + outlier)
+    terms = np.log((1 - OUTLIER_SHARE) * density + OUTLIER_SHARE)
     if weights is not None:
         terms *= _single(weights)[:, None]
     return np.asarray(terms.sum(axis=0), np.float64)
 
 
-def cost_of_mistake(outlier: float) -> float:
+def cost_of_mistake() -> float:
     """By how much one landmark that is taken for another lowers `log_likelihood` at most."""
-    least = float(np.exp(-MAX_MAHALANOBIS2 / 2))
-    return -math.log(max(outlier, least))
-
-
-class Landmark(NamedTuple):
-    """A landmark on the map: the mean (2,) and covariance (2, 2) of its position."""
-
-    mean_m: Floats
-    covariance_m2: Floats
+    return -math.log(OUTLIER_SHARE)
 
 
 def sightings(
@@ -169,56 +163,46 @@ def sightings(
     times, since a first sighting may have had another's name, and not from where the agent stands
     since `stationary_since_ns`: the same view again is no new evidence.
     """
-    chosen: list[tuple[Percept, Landmark]] = []
+    chosen: list[Percept] = []
+    means_m = []
+    covariances_m2 = []
     for percept in percepts:
         node = graph.get(Object, object_id(percept.label))
-        if node is None or not _informs(node, stationary_since_ns):
+        if node is None or not (node.surveyed or node.sightings >= MIN_SIGHTINGS):
             continue
-        landmark = _landmark(node)
-        if _is_sharp(landmark, percept, largest_sd_m):
-            chosen.append((percept, landmark))
-    return _sighting(chosen) if chosen else None
+        if is_seen_from_here(node, stationary_since_ns):
+            continue
 
+        samples = node.positions_m()
+        mean_m = np.full(len(samples), 1 / len(samples)) @ samples
+        offset_m = samples - mean_m
+        covariance_m2 = offset_m.T @ offset_m / max(1, len(samples) - 1)
 
-def _is_sharp(landmark: Landmark, percept: Percept, largest_sd_m: float) -> bool:
-    limit_m = largest_sd_m
-    if percept.has_range:
-        limit_m = min(limit_m, MAX_SD_SHARE * percept.range_m)
-    variance_m2 = float(landmark.covariance_m2[0, 0] + landmark.covariance_m2[1, 1])
-    return variance_m2 <= 2 * limit_m**2
+        limit_m = largest_sd_m
+        if percept.has_range:
+            limit_m = min(limit_m, MAX_SD_SHARE * percept.range_m)
+        if float(covariance_m2[0, 0] + covariance_m2[1, 1]) <= 2 * limit_m**2:
+            chosen.append(percept)
+            means_m.append(mean_m)
+            covariances_m2.append(covariance_m2)
 
+    if not chosen:
+        return None
 
-def _sighting(chosen: list[tuple[Percept, Landmark]]) -> Sighting:
-    percepts = [percept for percept, _ in chosen]
-    landmarks = [landmark for _, landmark in chosen]
     return Sighting(
-        labels=tuple(percept.label for percept in percepts),
-        mean_m=np.array([landmark.mean_m for landmark in landmarks]),
-        covariance_m2=np.array([landmark.covariance_m2 for landmark in landmarks]),
-        bearing_rad=np.array([percept.bearing_rad for percept in percepts]),
-        range_m=np.array([percept.range_m for percept in percepts]),
-        bearing_sd_rad=np.array([percept.bearing_sd_rad for percept in percepts]),
-        range_sd_m=np.array([percept.range_sd_m for percept in percepts]),
-        evidence=np.array([percept.evidence for percept in percepts]),
+        labels=tuple(percept.label for percept in chosen),
+        mean_m=np.array(means_m),
+        covariance_m2=np.array(covariances_m2),
+        bearing_rad=np.array([percept.bearing_rad for percept in chosen]),
+        range_m=np.array([percept.range_m for percept in chosen]),
+        bearing_sd_rad=np.array([percept.bearing_sd_rad for percept in chosen]),
+        range_sd_m=np.array([percept.range_sd_m for percept in chosen]),
+        evidence=np.array([percept.evidence for percept in chosen]),
     )
 
 
-def _landmark(node: Object) -> Landmark:
-    samples = node.positions_m()
-    mean_m = np.full(len(samples), 1 / len(samples)) @ samples
-    offset_m = samples - mean_m
-    covariance_m2 = offset_m.T @ offset_m / max(1, len(samples) - 1)
-    return Landmark(mean_m, covariance_m2)
-
-
-def _informs(node: Object, stationary_since_ns: int) -> bool:
-    """Whether another view of the landmark is evidence of where the agent is."""
-    is_confirmed = node.surveyed or node.sightings >= MIN_SIGHTINGS
-    return is_confirmed and not is_seen_from_here(node, stationary_since_ns)
-
-
 def is_seen_from_here(node: Object, stationary_since_ns: int) -> bool:
-    """Whether an agent that stands since `stationary_since_ns` has seen the landmark from where it
+    """If an agent that stands since `stationary_since_ns` has seen the landmark from where it
     stands.
     """
     is_stationary = stationary_since_ns != NEVER_NS

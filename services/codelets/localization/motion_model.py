@@ -22,6 +22,9 @@ DRIFT = SelfColumn.DRIFT_RAD_PER_M
 RANGE = SelfColumn.RANGE_GAIN
 COLUMNS = len(SelfColumn)
 GAINS = COLUMNS - POSE_COLUMNS
+# Correlation times of the lasting errors: wheels slip for seconds, stereo errs for minutes.
+MOTION_BIAS_TIME_S = 30.0
+RANGE_BIAS_TIME_S = 300.0
 
 
 def gain_sds(config: Config) -> Samples:
@@ -46,14 +49,14 @@ def propagate_bias(
 ) -> None:
     """Let the gains of (n, 7) samples vary in place, as they do in `duration_s`.
 
-    An Ornstein-Uhlenbeck process about 0: its spread stays that of `gain_sds`, its correlation
-    times are the configured ones.
+    An Ornstein-Uhlenbeck process about 0: its spread stays that of `gain_sds`.
     """
     sds = gain_sds(config)
     if not duration_s or not sds.any():
         return
-    motion_s = config.motion_bias_time_s
-    times_s = np.array([motion_s, motion_s, motion_s, config.range_bias_time_s])
+
+    motion_s = MOTION_BIAS_TIME_S
+    times_s = np.array([motion_s, motion_s, motion_s, RANGE_BIAS_TIME_S])
 
     remaining = np.exp(-duration_s / times_s)
     innovation_sds = sds * np.sqrt(1 - remaining**2)

@@ -4,20 +4,20 @@ position, and a place (paper §5.2).
 
 from __future__ import annotations
 
+import msgspec
+
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import SELF_ID, LinkKind, Object, Self, object_id
-from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.localization.landmarks import (
-    FIRST,
-    Seen,
     first_positions,
-    located,
     nearby_selves,
+    refreshed,
+    with_positions,
 )
 from cogmap.services.codelets.localization.motion_model import with_gains
 from cogmap.services.codelets.localization.sampling import generator, resample
@@ -27,20 +27,11 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """One task for each object in view that the map lacks."""
     by_label = sorted(context.percepts.objects, key=lambda percept: percept.label)
 
-    tasks = []
-    for percept in by_label:
-        if object_id(percept.label) in graph.nodes:
-            continue
-
-        task = context.task(
-            CODELET.name,
-            about=[SELF_ID],
-            subject=percept.label,
-            percepts=[percept],
-        )
-        tasks.append(task)
-
-    return tasks
+    return [
+        context.task(CODELET.name, about=[SELF_ID], subject=percept.label, percepts=[percept])
+        for percept in by_label
+        if object_id(percept.label) not in graph.nodes
+    ]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
@@ -50,18 +41,27 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     agent = graph.agent
     if agent is None:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
-    if agent.is_lost:
+    if agent.misfits.is_lost:
         return Answer()
 
     (percept,) = task.percepts
     rng = generator(task.task_id)
-    samples = with_gains(agent.samples.numpy(), config, rng)
-    nearby = nearby_selves(samples, config)
-    selves = resample(nearby, config.landmark_samples, 0.0, rng)
+    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
+    selves = resample(selves, config.landmark_samples, 0.0, rng)
 
-    node = _new(percept, agent, task)
-    positions_m = first_positions(selves, percept, config, rng)
-    return Answer(located(Seen(percept, node), task, graph, positions_m, FIRST))
+    node = Object(
+        id=object_id(percept.label),
+        cycle=task.cycle,
+        label=percept.label,
+        function=percept.function,
+        map=agent.map,
+        x_m=agent.x_m,
+        y_m=agent.y_m,
+        created_ns=task.stamp_ns,
+    )
+    first = msgspec.structs.replace(node, sightings=1)
+    placed = with_positions(first, first_positions(selves, percept, rng))
+    return Answer(refreshed(node, placed, percept, task, graph))
 
 
 CODELET = Codelet(
@@ -74,17 +74,3 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
-
-
-def _new(percept: Percept, agent: Self, task: Task) -> Object:
-    """An object that the map lacks, on the map where the agent is."""
-    return Object(
-        id=object_id(percept.label),
-        cycle=task.cycle,
-        label=percept.label,
-        function=percept.function,
-        map=agent.map,
-        x_m=agent.x_m,
-        y_m=agent.y_m,
-        created_ns=task.stamp_ns,
-    )

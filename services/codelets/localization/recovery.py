@@ -6,39 +6,46 @@ import math
 
 import numpy as np
 
-from cogmap.geometry.arrays import Singles
+from cogmap.geometry.arrays import Floats, Singles
 from cogmap.geometry.se2 import compose, relative
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.schemas.nodes import PathSegment, segment_id
 from cogmap.schemas.sensing import Percept
-from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.localization.measurement_model import (
+    FARTHEST_M,
+    GATE,
     MAX_SD_SHARE,
     Sighting,
     compare,
     log_likelihood,
 )
 from cogmap.services.codelets.localization.motion_model import COLUMNS, RANGE
-from cogmap.services.codelets.localization.sampling import Samples, position_sd_m
+from cogmap.services.codelets.localization.sampling import position_sd_m
 from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import ODOMETRY, STAMP, objects_along
 
 CANDIDATES = 16
-SEVERAL = 2
-MOST = 2 / 3
+# A pose is believed that so many landmarks fit, and such a share of those in view.
+MIN_FITTING = 2
+FITTING_SHARE = 2 / 3
 SURE_M = 1.0
 # The error of path integration since a landmark was seen, as a share of the distance.
 DRIFT_SHARE = 0.05
 
 
-def seen_before(graph: Graph, odometry: Samples, since_ns: float) -> list[Percept]:
+def seen_before(graph: Graph, odometry: Floats, since_ns: float) -> list[Percept]:
     """Landmarks that were seen after `since_ns`, as they would be in view now, each as it was seen
     last, from the newest two segments of the path.
 
     Path integration alone has the agent at `odometry` (3,).
     """
-    segments = _newest_segments(graph)
+    last = graph.last_segment
+    if last is None:
+        return []
+
+    before = graph.get(PathSegment, segment_id(last.number - 1))
+    segments = [last] if before is None else [before, last]
     rows = rows_of(segments)
     rows = rows[rows[:, STAMP] > since_ns * 1e-9]
 
@@ -57,49 +64,30 @@ def seen_before(graph: Graph, odometry: Samples, since_ns: float) -> list[Percep
         step = np.append(seen.where_m[index], 0.0)
         forwards_m, left_m, _ = relative(odometry, compose(then, step)).tolist()
 
-        moved_m = float(np.hypot(*(then - odometry)[:2]))
-        sd_m = _remembered_sd_m(seen.information[index], moved_m)
-        percepts.append(_percept(label, forwards_m, left_m, sd_m))
+        # It is as certain as when it was seen, and the less so the farther the agent went since.
+        variance_m2 = float(np.linalg.eigvalsh(np.linalg.inv(seen.information[index])).max())
+        drift_m = DRIFT_SHARE * float(np.hypot(*(then - odometry)[:2]))
+        sd_m = math.sqrt(variance_m2 + drift_m**2)
+        range_m = max(math.hypot(forwards_m, left_m), 1e-3)
+        percept = Percept(
+            label=label,
+            activation=1.0,
+            evidence=1.0,
+            bearing_rad=math.atan2(left_m, forwards_m),
+            range_m=range_m,
+            bearing_sd_rad=min(sd_m / range_m, math.pi),
+            range_sd_m=sd_m,
+            width_m=0.0,
+            height_m=0.0,
+            whole=False,
+            box_px=(0, 0, 0, 0),
+        )
+        percepts.append(percept)
+
     return percepts
 
 
-def _newest_segments(graph: Graph) -> list[PathSegment]:
-    last = graph.last_segment
-    if last is None:
-        return []
-
-    before = graph.get(PathSegment, segment_id(last.number - 1))
-    return [last] if before is None else [before, last]
-
-
-def _remembered_sd_m(information: Samples, moved_m: float) -> float:
-    """The standard deviation, m, of where a landmark is that was seen `moved_m` ago with (2, 2)
-    information.
-    """
-    covariance_m2 = np.linalg.inv(information)
-    variance_m2 = float(np.linalg.eigvalsh(covariance_m2).max())
-    drift_m = DRIFT_SHARE * moved_m
-    return math.sqrt(variance_m2 + drift_m**2)
-
-
-def _percept(label: str, forwards_m: float, left_m: float, sd_m: float) -> Percept:
-    range_m = max(math.hypot(forwards_m, left_m), 1e-3)
-    return Percept(
-        label=label,
-        activation=1.0,
-        evidence=1.0,
-        bearing_rad=math.atan2(left_m, forwards_m),
-        range_m=range_m,
-        bearing_sd_rad=min(sd_m / range_m, math.pi),
-        range_sd_m=sd_m,
-        width_m=0.0,
-        height_m=0.0,
-        whole=False,
-        box_px=(0, 0, 0, 0),
-    )
-
-
-def relocalize(gains: Samples, seen: Sighting, config: Config, rng: np.random.Generator) -> Samples:
+def relocalize(gains: Floats, seen: Sighting, rng: np.random.Generator) -> Floats:
     """(n, 7) samples of the self by what is in view alone; the senses' gains are those of (n, 7)
     `gains`.
 
@@ -113,13 +101,15 @@ def relocalize(gains: Samples, seen: Sighting, config: Config, rng: np.random.Ge
     which = rng.integers(len(seen.labels), size=number)
     direction_rad = rng.uniform(-np.pi, np.pi, number)
 
-    root_m = _roots(seen.covariance_m2)[which]
+    # A square root of each covariance, which may be singular.
+    values, vectors = np.linalg.eigh(seen.covariance_m2)
+    root_m = (vectors * np.sqrt(values.clip(0.0))[:, None, :])[which]
     drawn = rng.normal(0.0, 1.0, (number, 2))
     landmark_m = seen.mean_m[which] + np.einsum("nij,nj->ni", root_m, drawn)
 
     measured_m = rng.normal(seen.range_m[which], seen.range_sd_m[which])
     near_m = measured_m / (1 + candidates[:, RANGE])
-    any_m = rng.uniform(0.0, config.farthest_m, number)
+    any_m = rng.uniform(0.0, FARTHEST_M, number)
     distance_m = np.where(seen.has_range[which], near_m, any_m).clip(0.0)
     candidates[:, 0] = landmark_m[:, 0] + distance_m * np.cos(direction_rad)
     candidates[:, 1] = landmark_m[:, 1] + distance_m * np.sin(direction_rad)
@@ -131,32 +121,30 @@ def relocalize(gains: Samples, seen: Sighting, config: Config, rng: np.random.Ge
 
     density = compare(candidates, seen).density
     density[which, np.arange(number)] = 1.0  # it was drawn by that one
-    return _drawn(candidates, density, len(gains), config, rng)
+    return _drawn(candidates, density, len(gains), rng)
 
 
-def believed_of(
-    samples: Samples, seen: Sighting, is_unsure: bool, several: int, config: Config
-) -> Samples | None:
-    """Those of relocalization's (n, 7) samples that the agent believes to be where it is; None
-    where it believes none.
+def best_of(samples: Floats, seen: Sighting, is_unsure: bool, min_fitting: int) -> Floats | None:
+    """Those of relocalization's (n, 7) samples at which the agent is taken to be; None if it is at
+    none.
 
-    It believes them where most landmarks fit one of them together, each by how certain its name is.
-    Where it was sure to be elsewhere, it believes only those that the most fit, if they are in one
-    place, and `several` landmarks at least do: one whose own place is not sure counts for half, for
-    two of those fit somewhere nearly always.
+    Most landmarks must fit one of them together, each by how certain its name is. An agent that was
+    sure to be elsewhere is where most of all fit, if that is one place, and `min_fitting` landmarks
+    at least do: one whose own place is not sure counts for half, for two of those fit somewhere
+    nearly always.
     """
     weights = seen.weights
-    is_fitting = compare(samples, seen).squared < config.gate**2
+    is_fitting = compare(samples, seen).squared < GATE**2
     fitting = weights @ is_fitting
     best = fitting.argmax()
-    if fitting[best] < MOST * weights.sum():
+    if fitting[best] < FITTING_SHARE * weights.sum():
         return None
     if is_unsure:
         return samples
 
     variance_m2 = np.trace(seen.covariance_m2, axis1=1, axis2=2) / 2
     weights *= np.where(variance_m2 <= SURE_M**2, 1.0, 0.5)
-    if weights[is_fitting[:, best]].sum() < several:
+    if weights[is_fitting[:, best]].sum() < min_fitting:
         return None
 
     there = samples[np.isclose(fitting, fitting[best])]
@@ -164,9 +152,7 @@ def believed_of(
     return there if position_sd_m(there) <= limit_m else None
 
 
-def relocalize_heading(
-    samples: Samples, seen: Sighting, config: Config, rng: np.random.Generator
-) -> Samples:
+def relocalize_heading(samples: Floats, seen: Sighting, rng: np.random.Generator) -> Floats:
     """(n, 7) samples of the self, its position known, its heading unknown: turned by what is in
     view.
 
@@ -186,23 +172,13 @@ def relocalize_heading(
 
     density = compare(candidates, seen).density
     density[which, np.arange(number)] *= np.exp(drawn**2 / 2)  # it was turned by that one's bearing
-    return _drawn(candidates, density, len(samples), config, rng)
+    return _drawn(candidates, density, len(samples), rng)
 
 
-def _drawn(
-    candidates: Samples, density: Singles, count: int, config: Config, rng: np.random.Generator
-) -> Samples:
+def _drawn(candidates: Floats, density: Singles, count: int, rng: np.random.Generator) -> Floats:
     """`count` of (n, 7) candidates, drawn by the (k, n) densities of the landmarks in view."""
-    scores = log_likelihood(density, config.outlier_share)
+    scores = log_likelihood(density)
     weights = np.exp(scores - scores.max())
     probabilities = weights / weights.sum()
     chosen = rng.choice(len(candidates), size=count, p=probabilities)
     return candidates[chosen]
-
-
-def _roots(covariances: Samples) -> Samples:
-    """A square root of each (k, 2, 2) covariance, which may be singular."""
-    values, vectors = np.linalg.eigh(covariances)
-    sd = np.sqrt(values.clip(0.0))
-    roots: Samples = vectors * sd[:, None, :]
-    return roots

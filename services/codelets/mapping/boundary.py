@@ -15,17 +15,18 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, LINK_OFFSETS, WEIGHT_COLUMNS, Window
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import SELF_ID, PlaceColumn, Self
-from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.mapping.edges import Edges, cut_links, edges_of
 from cogmap.services.codelets.mapping.evidence import accumulated, blended, weights_of
 from cogmap.services.codelets.mapping.local_grid import LocalGrid
 from cogmap.services.codelets.mapping.rays import Rays, clear_cells, rays_of
 
+# The distance up to which links are cut or freed by what is seen.
+REACH_M = 25.0
 # In cells, from the middle of one along both axes: road there is road at the place node, and an
 # edge there is right beside it.
 ROAD_WITHIN = 0.35
@@ -47,7 +48,7 @@ class Seen(NamedTuple):
     certainty: Floats
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
     """One task in each cycle whose view shows where the road ends, or what stands around."""
     ends = context.percepts.road_boundary_m.shape[0]
     rays = 0 if context.scan is None else context.scan.range_m.shape[0]
@@ -60,17 +61,17 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     return [task]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """New evidence and weights of the links around the agent, and the obstacles there; none while
     the agent is lost.
     """
     agent = graph.agent
     if agent is None or task.road_m is None or task.road_boundary_m is None:
         raise MessageError(f"task {task.task_id}: no self node, or no road points")
-    if agent.is_lost:
+    if agent.misfits.is_lost:
         return Answer()
 
-    grid = LocalGrid.around(agent, graph.cell_m(agent.map), config.boundary_reach_m, config)
+    grid = LocalGrid.around(agent, graph.cell_m(agent.map), REACH_M)
     known = graph.places.window(agent.map, COLUMNS, grid.extent)
     after = _after(task.road_m, task.road_boundary_m, task.scan, grid, known)
     return Answer(grid.changed(WRITTEN, known.values[: len(WRITTEN)], after))
@@ -83,8 +84,6 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Self, *COLUMNS}),
     writes=frozenset(WRITTEN),
-    config=Config,
-    section=SECTION,
 )
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import Link, Phase
 from cogmap.schemas.nodes import (
@@ -22,7 +22,6 @@ from cogmap.schemas.nodes import (
     nearest_place,
     object_id,
 )
-from cogmap.services.codelets.config import SECTION, Config
 
 LOOK = "charging-place"
 # As near to it the agent is charged as well by the one that it knows.
@@ -31,20 +30,20 @@ SD_M = 2.0
 MAX_PLACES = 64
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
     """One task where a need is eased, and nothing is known nearby that eases it."""
     agent = graph.agent
-    if agent is None or agent.is_lost or not _unexplained(agent, graph):
+    if agent is None or agent.misfits.is_lost or not _unexplained(agent, graph):
         return []
     return [context.task(CODELET.name, about=[SELF_ID])]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """An object where the agent stands that eases each need that is eased. What was felt is known
     for good: its base level is the highest.
     """
     agent = graph.agent
-    if agent is None or agent.is_lost:
+    if agent is None or agent.misfits.is_lost:
         return Answer()
 
     answer = Answer()
@@ -82,8 +81,6 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Self, Need, Object}),
     writes=frozenset({Object, LinkKind.AT}),
-    config=Config,
-    section=SECTION,
 )
 
 

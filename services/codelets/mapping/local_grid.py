@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,9 +14,11 @@ from cogmap.graph.window import Extent, Window
 from cogmap.schemas.graph import Operation
 from cogmap.schemas.nodes import PlaceColumn, Self
 from cogmap.services.codelets.cells import changed_cells
-from cogmap.services.codelets.config import Config
 
 MARGIN_CELLS = 2
+# The standard deviation of a distance seen over the distance, by which road, boundaries and
+# obstacles far away count less.
+RANGE_SD_SHARE = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,8 +26,7 @@ class LocalGrid:
     """The cells of a map within reach of a pose; arrays (w, h) are indexed [i, j] from the cell
     `extent.lower`. Positions on it are in cells of the map.
 
-    What is seen errs by `range_sd_share` of its distance, and by the standard deviation of the
-    pose.
+    What is seen errs by RANGE_SD_SHARE of its distance, and by the standard deviation of the pose.
     """
 
     map_id: str
@@ -32,21 +34,21 @@ class LocalGrid:
     pose: Floats
     pose_sd_m: float
     reach_m: float
-    range_sd_share: float
     extent: Extent
 
     @classmethod
-    def around(cls, agent: Self, cell_m: float, reach_m: float, config: Config) -> LocalGrid:
+    def around(cls, agent: Self, cell_m: float, reach_m: float) -> LocalGrid:
         """The cells within `reach_m` of the agent, and some more."""
         pose = np.array([agent.x_m, agent.y_m, agent.heading_rad])
+        here_i, here_j = np.rint(pose[:2] / cell_m).astype(int).tolist()
+        side = math.ceil(reach_m / cell_m) + MARGIN_CELLS
         return cls(
             map_id=agent.map,
             cell_m=cell_m,
             pose=pose,
             pose_sd_m=float(np.hypot(agent.x_sd_m, agent.y_sd_m)),
             reach_m=reach_m,
-            range_sd_share=config.range_sd_share,
-            extent=_around(pose[:2] / cell_m, reach_m / cell_m),
+            extent=Extent((here_i - side, here_j - side), (here_i + side + 1, here_j + side + 1)),
         )
 
     @property
@@ -79,7 +81,7 @@ class LocalGrid:
         """
         half_m = self.cell_m / 2
         pose_sd_m = min(self.pose_sd_m, half_m)
-        range_sd_m = self.range_sd_share * range_m
+        range_sd_m = RANGE_SD_SHARE * range_m
 
         variance_m2 = range_sd_m**2 + pose_sd_m**2
         certain: Floats = half_m**2 / (half_m**2 + variance_m2)
@@ -108,12 +110,3 @@ class LocalGrid:
         """
         known = Window(self.extent.lower, tuple(columns), before)
         return changed_cells(self.map_id, known, after)
-
-
-def _around(position: Floats, reach: float) -> Extent:
-    """The cells within reach of a position, (2,), and some more."""
-    here_i, here_j = np.rint(position).astype(int).tolist()
-    side = int(np.ceil(reach)) + MARGIN_CELLS
-    lower = (here_i - side, here_j - side)
-    upper = (here_i + side + 1, here_j + side + 1)
-    return Extent(lower, upper)

@@ -138,24 +138,6 @@ def segments(rows: Floats, first: int = 0) -> list[PathSegment]:
     return parts
 
 
-def odometry_of(agent: Self) -> Floats:
-    """(3,): the agent's pose by path integration alone."""
-    pose = [
-        agent.odometry_x_m,
-        agent.odometry_y_m,
-        agent.odometry_heading_rad,
-    ]
-    return np.array(pose)
-
-
-def variances_of(agent: Self) -> Floats:
-    """(2,): the variance of path integration since the start, of the distance, in m^2, and of the
-    heading, in rad^2.
-    """
-    variances = [agent.odometry_variance_m2, agent.odometry_variance_rad2]
-    return np.array(variances)
-
-
 def steps_of(rows: Floats, config: Config) -> Constraints:
     """The steps of path integration from each row to the next, as certain as self-motion states, or
     less, by the distance.
@@ -244,7 +226,7 @@ def _appended(number: int, rows: Floats, row: Floats) -> tuple[int, Floats]:
 
 def _viewpoint(agent: Self, number: int, row: Floats) -> Viewpoint:
     """Where the agent is, from the place `row` of path segment `number`."""
-    step = relative(row[ODOMETRY], odometry_of(agent))
+    step = relative(row[ODOMETRY], agent.odometry.pose())
     return Viewpoint(
         number=number,
         stamp_s=float(row[STAMP]),
@@ -257,8 +239,8 @@ def _row(stamp_ns: int, agent: Self) -> Floats:
     """(1, COLUMNS): the place where the agent is, as a row of the path."""
     stamp_s = stamp_ns * 1e-9
     pose = mean_pose(agent.samples.numpy())
-    odometry = odometry_of(agent)
-    variances = variances_of(agent)
+    odometry = agent.odometry.pose()
+    variances = agent.odometry.variances()
 
     row = np.concatenate([[stamp_s], pose, odometry, variances, [stamp_s, 0.0]])
     return row[None]
@@ -270,7 +252,7 @@ def _is_apart(rows: Floats, agent: Self, spacing_m: float) -> bool:
         return True
 
     before = rows[-1, ODOMETRY]
-    moved_m = odometry_of(agent)[:2] - before[:2]
+    moved_m = agent.odometry.pose()[:2] - before[:2]
     distance_m = np.hypot(*moved_m)
     return bool(distance_m >= spacing_m)
 
@@ -279,11 +261,11 @@ def _is_lost_since(rows: Floats, agent: Self) -> bool:
     """Whether the agent has got lost since the last row: what it sees now, it may see from
     elsewhere.
     """
-    if not agent.is_lost:
+    if not agent.misfits.is_lost:
         return False
 
     last_s = float(rows[-1, STAMP])
-    last_fit_s = agent.last_fit_ns * 1e-9
+    last_fit_s = agent.misfits.last_fit_ns * 1e-9
     return last_s <= last_fit_s
 
 

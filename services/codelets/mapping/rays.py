@@ -9,7 +9,7 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import rotate
 from cogmap.schemas.array import Array
-from cogmap.services.codelets.mapping.local_grid import LocalGrid
+from cogmap.services.codelets.mapping.local_grid import RANGE_SD_SHARE, LocalGrid
 
 STEP = 0.5
 MIN_WIDTH_M = 0.3
@@ -56,7 +56,7 @@ def rays_of(scan: Array | None, road_m: Floats, grid: LocalGrid) -> Rays:
     bearing_rad, range_m = _before_road(rays, road_m).T
     has_seen = range_m > 0
 
-    before_hit_m = range_m * (1 - 2 * grid.range_sd_share) - grid.cell_m / 2
+    before_hit_m = range_m * (1 - 2 * RANGE_SD_SHARE) - grid.cell_m / 2
     clear_m = np.where(has_seen, before_hit_m, grid.reach_m / 2)
 
     ahead = np.column_stack([np.cos(bearing_rad), np.sin(bearing_rad)])

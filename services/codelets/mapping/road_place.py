@@ -12,12 +12,11 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import Cells, Operation, Phase
 from cogmap.schemas.nodes import SELF_ID, PlaceColumn, Self
-from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.mapping.evidence import blended
 from cogmap.services.codelets.mapping.local_grid import LocalGrid
 from cogmap.services.codelets.mapping.rays import clear_cells, rays_of
@@ -28,21 +27,21 @@ ENOUGH_POINTS = 3
 NOT_ROAD_M = (3.0, 8.0)
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
     """One task in each cycle."""
     task = context.task(CODELET.name, about=[SELF_ID], with_road=True, with_scan=True)
     return [task]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """Activate the place node that the agent is at, and mark those near it that it sees as road."""
     agent = graph.agent
     if agent is None or task.road_m is None:
         raise MessageError(f"task {task.task_id}: no self node, or no road points")
 
-    grid = LocalGrid.around(agent, graph.cell_m(agent.map), ROAD_REACH_M, config)
+    grid = LocalGrid.around(agent, graph.cell_m(agent.map), ROAD_REACH_M)
     operations: list[Operation] = [_activated(grid, task.cycle)]
-    if not agent.is_lost and task.road_m.shape[0]:
+    if not agent.misfits.is_lost and task.road_m.shape[0]:
         window = graph.places.window(agent.map, [PlaceColumn.ROAD], grid.extent)
         after = _road(task.road_m, task.scan, grid, window.values)
         operations += grid.changed(window.columns, window.values, after)
@@ -57,8 +56,6 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Self, PlaceColumn.ROAD}),
     writes=frozenset({PlaceColumn.ACTIVATION, PlaceColumn.ROAD}),
-    config=Config,
-    section=SECTION,
 )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import WEIGHT_COLUMNS, Extent
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import Operation, Phase
 from cogmap.schemas.nodes import ROOT_MAP, SELF_ID, Map, PlaceColumn, Self, coarse_map_id
@@ -22,13 +22,14 @@ from cogmap.services.codelets.cells import changed_cells
 from cogmap.services.codelets.sub_maps.coarsening import (
     FACTOR,
     MARGIN,
-    Places,
     coarser,
     places_of,
 )
-from cogmap.services.codelets.sub_maps.resolution_config import COARSE_PLACES
-from cogmap.services.codelets.sub_maps.resolution_config import CoarsePlacesConfig as Config
 
+# An update takes a worker for some cycles.
+EVERY_CYCLES = 5
+# The distance from the agent within which the root map changes as it looks around.
+REACH_M = 30.0
 LEVELS = 2
 CELLS = FACTOR**LEVELS
 """The cells of the root map along the side of the coarsest map's cell."""
@@ -40,14 +41,14 @@ COARSE = (PlaceColumn.ROAD, *WEIGHT_COLUMNS)
 COLUMNS = (*COARSE, PlaceColumn.OBSTACLE)
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task every `every_cycles`."""
-    if graph.agent is None or context.cycle % config.every_cycles:
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
+    """One task every EVERY_CYCLES."""
+    if graph.agent is None or context.cycle % EVERY_CYCLES:
         return []
     return [context.task(CODELET.name, about=[SELF_ID])]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """The coarse places that have changed; first of all, the maps that they are in."""
     agent = graph.agent
     if agent is None:
@@ -60,10 +61,15 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     answer = Answer()
     blocks = _blocks(graph.places.extent(ROOT_MAP))
     if blocks:
-        turn = task.cycle // config.every_cycles
+        turn = task.cycle // EVERY_CYCLES
         answer.operations.extend(_update(graph, blocks[turn % len(blocks)]))
     if agent.map == ROOT_MAP:
-        answer.operations.extend(_update(graph, _around(agent, graph, config)))
+        side_m = graph.cell_m(ROOT_MAP) * CELLS
+        here_m = np.array([agent.x_m, agent.y_m])
+        first_i, first_j = np.floor((here_m - REACH_M) / side_m).astype(int).tolist()
+        last_i, last_j = np.ceil((here_m + REACH_M) / side_m).astype(int).tolist()
+        around = Extent((first_i, first_j), (last_i + 1, last_j + 1))
+        answer.operations.extend(_update(graph, around))
 
     return answer
 
@@ -82,8 +88,6 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Self, Map, *COLUMNS}),
     writes=frozenset({Map, *COARSE}),
-    config=Config,
-    section=COARSE_PLACES,
 )
 
 
@@ -110,22 +114,18 @@ def _blocks(extent: Extent) -> list[Extent]:
     return blocks
 
 
-def _around(agent: Self, graph: Graph, config: Config) -> Extent:
-    """The cells of the coarsest map around the agent."""
-    side_m = graph.cell_m(ROOT_MAP) * CELLS
-    low = np.floor((np.array([agent.x_m, agent.y_m]) - config.reach_m) / side_m)
-    high = np.ceil((np.array([agent.x_m, agent.y_m]) + config.reach_m) / side_m) + 1
-
-    first_i, first_j = low.astype(int).tolist()
-    last_i, last_j = high.astype(int).tolist()
-    return Extent((first_i, first_j), (last_i, last_j))
-
-
 def _update(graph: Graph, coarsest: Extent) -> list[Operation]:
     """The cells that change on the levels whose coarsest one has these."""
+    # Each level needs the finer cells below its own, with a margin.
     extents = [coarsest]
+    margin = FACTOR // 2 + MARGIN
     for _ in range(LEVELS):
-        extents.insert(0, _finer(extents[0]))
+        (low_i, low_j), (high_i, high_j) = extents[0].lower, extents[0].upper
+        finer = Extent(
+            (FACTOR * low_i - margin, FACTOR * low_j - margin),
+            (FACTOR * high_i - FACTOR // 2 + MARGIN, FACTOR * high_j - FACTOR // 2 + MARGIN),
+        )
+        extents.insert(0, finer)
 
     window = graph.places.window(ROOT_MAP, COLUMNS, extents[0])
     places = places_of(
@@ -134,24 +134,9 @@ def _update(graph: Graph, coarsest: Extent) -> list[Operation]:
     operations: list[Operation] = []
     for level, extent in enumerate(extents[1:], start=1):
         places = coarser(places)
-        operations += _changed(graph, coarse_map_id(level), extent, places)
+        identifier = coarse_map_id(level)
+        known = graph.places.window(identifier, COARSE, extent)
+        after = np.concatenate([places.road[None], places.is_open.astype(np.float32)])
+        operations += changed_cells(identifier, known, after)
 
     return operations
-
-
-def _finer(extent: Extent) -> Extent:
-    """The finer cells, with a margin, of a rectangle of coarse ones."""
-    first = FACTOR // 2 + MARGIN
-    low_i, low_j = extent.lower
-    high_i, high_j = extent.upper
-    return Extent(
-        (FACTOR * low_i - first, FACTOR * low_j - first),
-        (FACTOR * high_i - FACTOR // 2 + MARGIN, FACTOR * high_j - FACTOR // 2 + MARGIN),
-    )
-
-
-def _changed(graph: Graph, map_id: str, extent: Extent, places: Places) -> list[Operation]:
-    """The cells of one coarse map that change."""
-    known = graph.places.window(map_id, COARSE, extent)
-    after = np.concatenate([places.road[None], places.is_open.astype(np.float32)])
-    return changed_cells(map_id, known, after)

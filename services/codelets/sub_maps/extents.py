@@ -9,10 +9,13 @@ from typing import NamedTuple
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import ROOT_MAP, Map, Object, map_id
-from cogmap.services.codelets.sub_maps.config import Config
 from cogmap.services.codelets.sub_maps.members import positions_of
 
 MIN_SIDE_M = 1.0
+# A sub-map is sorted anew when its objects have moved its border by more.
+MOVED_M = 5.0
+# The place nodes that the grid of a sub-map has about, by which it is fine or coarse.
+PLACES = 1600
 COARSEST = 4
 """The cells of a sub-map are at most 2^COARSEST times coarser than the root map's; finer ones would
 know no more than those.
@@ -47,20 +50,20 @@ def extent_of(positions_m: Floats) -> Extent:
     return Extent(x_m, y_m, max(MIN_SIDE_M, width_m), max(MIN_SIDE_M, height_m))
 
 
-def is_outdated(node: Map, members: Mapping[int, Sequence[Object]], config: Config) -> bool:
+def is_outdated(node: Map, members: Mapping[int, Sequence[Object]]) -> bool:
     """Whether a sub-map has lost its objects, or they cover another area by now."""
     (objects,) = members.values()
     if not objects:
         return True
 
-    return extent_of(positions_of(objects)).differs_from(node, config.moved_m)
+    return extent_of(positions_of(objects)).differs_from(node, MOVED_M)
 
 
-def sub_map_node(number: int, extent: Extent, graph: Graph, config: Config) -> Map:
+def sub_map_node(number: int, extent: Extent, graph: Graph) -> Map:
     """The node of a sub-map. The larger its area, the coarser its grid (paper §5.3)."""
     root_cell_m = graph.cell_m(ROOT_MAP)
     area_m2 = extent.width_m * extent.height_m
-    wanted_m = math.sqrt(area_m2 / config.places)
+    wanted_m = math.sqrt(area_m2 / PLACES)
 
     # Powers of two, so that a grid stays as it is while its sub-map grows a little.
     steps = round(math.log2(wanted_m / root_cell_m))

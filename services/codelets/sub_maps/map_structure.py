@@ -20,7 +20,7 @@ from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_id, object
 from cogmap.services.codelets.nodes import nodes_of
 from cogmap.services.codelets.sub_maps.config import SECTION, Config
 from cogmap.services.codelets.sub_maps.cut_links import CutLinks
-from cogmap.services.codelets.sub_maps.extents import extent_of, is_outdated, sub_map_node
+from cogmap.services.codelets.sub_maps.extents import MOVED_M, extent_of, is_outdated, sub_map_node
 from cogmap.services.codelets.sub_maps.labels import NEW
 from cogmap.services.codelets.sub_maps.members import (
     maps_around,
@@ -32,9 +32,13 @@ from cogmap.services.codelets.sub_maps.members import (
 )
 from cogmap.services.codelets.sub_maps.sub_maps import SubMaps
 
-MANY = 50
-MANY_SHARE = 0.25
-"""So many objects without a sub-map, and such a share of those with one, have all sorted anew."""
+# Views of an object before it gets into a sub-map.
+MIN_SIGHTINGS = 2
+# The distance up to which an object that arrives may change a sub-map.
+REACH_M = 50.0
+# So many objects without a sub-map, and such a share of those with one, have all sorted anew.
+ALL_ANEW_FROM = 50
+ALL_ANEW_SHARE = 0.25
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
@@ -49,7 +53,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     about = _new_in_view(context, graph, config)
     if maps:
         checked = maps[context.cycle % len(maps)]
-        if is_outdated(checked, members_of([checked], graph), config):
+        if is_outdated(checked, members_of([checked], graph)):
             about.append(checked.id)
 
     if not about:
@@ -99,7 +103,7 @@ def _are_many_new(graph: Graph, maps: list[Map]) -> bool:
         known += len(graph.links.sources(node.id, LinkKind.WITHIN))
 
     new = graph.count(Object) - known
-    return new > max(MANY, MANY_SHARE * known)
+    return new > max(ALL_ANEW_FROM, ALL_ANEW_SHARE * known)
 
 
 def _new_in_view(context: CycleContext, graph: Graph, config: Config) -> list[str]:
@@ -108,7 +112,7 @@ def _new_in_view(context: CycleContext, graph: Graph, config: Config) -> list[st
 
     new = []
     for node in nodes_of(graph, Object, names):
-        is_sure = node.surveyed or node.sightings >= config.min_sightings
+        is_sure = node.surveyed or node.sightings >= MIN_SIGHTINGS
         if is_sure and _is_new(node, graph):
             new.append(node.id)
 
@@ -126,7 +130,7 @@ def _scope(task: Task, graph: Graph, config: Config) -> _Scope:
     if task.about:
         new = [node for node in nodes_of(graph, Object, task.about) if _is_new(node, graph)]
         moved = nodes_of(graph, Map, task.about)
-        maps = maps_around(sub_maps_of(graph), new, moved, config.reach_m)
+        maps = maps_around(sub_maps_of(graph), new, moved, REACH_M)
     else:
         new = [node for node in graph.of_kind(Object) if _is_new(node, graph)]
         moved = []
@@ -188,8 +192,8 @@ def _map_nodes(scope: _Scope, numbers: Indices, graph: Graph, config: Config) ->
     for number in np.unique(numbers).tolist():
         extent = extent_of(positions_m[numbers == number])
         before = graph.get(Map, map_id(number))
-        if before is None or extent.differs_from(before, config.moved_m):
-            written.append(sub_map_node(number, extent, graph, config))
+        if before is None or extent.differs_from(before, MOVED_M):
+            written.append(sub_map_node(number, extent, graph))
             if before is not None:
                 written.append(DropPlaces(map=before.id))
 

@@ -30,6 +30,15 @@ from scipy.special import gammaln
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.services.codelets.sub_maps.config import Config
 
+# The extent of a sub-map before any object is known: the standard deviation of its objects'
+# positions.
+SUB_MAP_SD_M = 50.0
+# The concentration of the prior over a sub-map's mix of functions, for each: Jeffreys' prior.
+FUNCTION_CONCENTRATION = 0.5
+# The shares of neighbours with a boundary between them, within a sub-map and between two.
+CROSSED_WITHIN = 0.05
+CROSSED_BETWEEN = 0.6
+# Weak priors: of some objects' worth.
 MEAN_PRIOR_COUNT = 1e-3
 SCATTER_PRIOR_COUNT = 4.0
 SPACING_MEAN_PRIOR_COUNT = 0.01
@@ -125,10 +134,9 @@ class Mixture:
         count = np.where(is_empty, 1.0, statistics[:, COUNT])
 
         evidence = np.full(len(count), math.log(weights.concentration))
-        evidence += weights.position_weight * _log_positions(statistics, count, self._scale_m2)
+        evidence += weights.position_weight * _log_positions(statistics, count)
         evidence += weights.spacing_weight * _log_spacings(statistics, count)
-        prior = weights.function_concentration
-        evidence += weights.function_weight * _log_functions(statistics, prior)
+        evidence += weights.function_weight * _log_functions(statistics)
 
         evidence[is_empty] = 0.0
         return evidence
@@ -138,11 +146,8 @@ class Mixture:
         as a logarithm: by whether a boundary is between them, and by the logarithm of how far apart
         they are over the spacing of objects there.
         """
-        within = self.config.crossed_within
-        between = self.config.crossed_between
-
-        crossed = math.log(within / between)
-        clear = math.log((1 - within) / (1 - between))
+        crossed = math.log(CROSSED_WITHIN / CROSSED_BETWEEN)
+        clear = math.log((1 - CROSSED_WITHIN) / (1 - CROSSED_BETWEEN))
         by_boundary = self.config.boundary_weight * np.where(is_crossed, crossed, clear)
 
         excess = np.maximum(gaps - USUAL_GAP, 0.0) / GAP_SD
@@ -150,15 +155,12 @@ class Mixture:
         bonds: Floats = by_boundary + by_gap
         return bonds
 
-    @property
-    def _scale_m2(self) -> float:
-        return self.config.sub_map_sd_m**2 * SCATTER_PRIOR_COUNT
 
-
-def _log_positions(statistics: Floats, count: Floats, scale_m2: float) -> Floats:
+def _log_positions(statistics: Floats, count: Floats) -> Floats:
     """(k,): the logarithm of the marginal likelihood of positions, and of the prior of the sizes of
     clusters.
     """
+    scale_m2 = SUB_MAP_SD_M**2 * SCATTER_PRIOR_COUNT
     mean_count = MEAN_PRIOR_COUNT + count
     degrees = SCATTER_PRIOR_COUNT + count
     sum_x, sum_y = statistics[:, SUM].T
@@ -205,7 +207,7 @@ def _log_spacings(statistics: Floats, count: Floats) -> Floats:
     return evidence
 
 
-def _log_functions(statistics: Floats, prior: float) -> Floats:
+def _log_functions(statistics: Floats) -> Floats:
     """(k,): the logarithm of the marginal likelihood of the functions that are known."""
     counts = statistics[:, FUNCTIONS:]
     kinds = counts.shape[1]
@@ -213,6 +215,7 @@ def _log_functions(statistics: Floats, prior: float) -> Floats:
         return np.zeros(len(counts))
 
     known = counts.sum(axis=1)
+    prior = FUNCTION_CONCENTRATION
     each = gammaln(prior + counts) - gammaln(prior)
     together = gammaln(prior * kinds) - gammaln(prior * kinds + known)
     evidence: Floats = each.sum(axis=1) + together

@@ -9,19 +9,17 @@ places before its frame has settled, and those that just have get a block of the
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.codelets import Task
-from cogmap.schemas.graph import Operation, Phase
+from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import ROOT_MAP, SELF_ID, Map, Self
+from cogmap.services.codelets.sub_maps.coarse_places import REACH_M
 from cogmap.services.codelets.sub_maps.resampling import COLUMNS
-from cogmap.services.codelets.sub_maps.resolution_config import SUB_MAP_PLACES
-from cogmap.services.codelets.sub_maps.resolution_config import SubMapPlacesConfig as Config
 from cogmap.services.codelets.sub_maps.sub_map_grid import (
     SETTLED_CYCLES,
     any_with_places,
@@ -32,36 +30,47 @@ from cogmap.services.codelets.sub_maps.sub_map_grid import (
     with_places,
 )
 
+# An update takes a worker for some cycles.
+EVERY_CYCLES = 10
 NEW_TURNS = 8
 """For so many turns sub-maps that have settled count as new."""
 
 
-def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task every `every_cycles`, where sub-maps have settled."""
+def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
+    """One task every EVERY_CYCLES, where sub-maps have settled."""
     # Coarse maps have their turn in other cycles: a worker that is long at work gets no more.
-    is_time = context.cycle % config.every_cycles == config.every_cycles // 3
+    is_time = context.cycle % EVERY_CYCLES == EVERY_CYCLES // 3
     if graph.agent is None or not is_time or not any_with_places(graph, context.cycle):
         return []
     return [context.task(CODELET.name, about=[SELF_ID])]
 
 
-def run(task: Task, graph: Graph, config: Config) -> Answer:
+def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """The places of sub-maps that have changed."""
     agent = graph.agent
     if agent is None:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
 
     maps = with_places(graph, task.cycle)
-    new_cycles = SETTLED_CYCLES + NEW_TURNS * config.every_cycles
+    new_cycles = SETTLED_CYCLES + NEW_TURNS * EVERY_CYCLES
     new = [node for node in maps if task.cycle - node.cycle <= new_cycles]
     turns = [maps] if len(new) == len(maps) else [maps, new]
 
     answer = Answer()
+    turn = task.cycle // EVERY_CYCLES
     for some in turns:
-        turn = task.cycle // config.every_cycles
-        answer.operations.extend(_update_one(some, turn, graph))
+        if some:
+            number, index = divmod(turn, len(some))
+            node = some[index]
+            chosen = block(node, number % block_count(node, graph), graph)
+            answer.operations.extend(updated(node, chosen, graph))
     if agent.map == ROOT_MAP:
-        answer.operations.extend(_update_around(agent, maps, graph, config))
+        here_m = np.array([agent.x_m, agent.y_m])
+        for node in maps:
+            away_m = math.hypot(agent.x_m - node.x_m, agent.y_m - node.y_m)
+            if away_m <= REACH_M + math.hypot(node.width_m, node.height_m) / 2:
+                near = cells_around(node, here_m, REACH_M)
+                answer.operations.extend(updated(node, near, graph))
 
     return answer
 
@@ -82,32 +91,4 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Self, Map, *COLUMNS}),
     writes=frozenset(COLUMNS),
-    config=Config,
-    section=SUB_MAP_PLACES,
 )
-
-
-def _update_one(maps: Sequence[Map], turn: int, graph: Graph) -> list[Operation]:
-    """One block of one of some sub-maps."""
-    if not maps:
-        return []
-
-    number, index = divmod(turn, len(maps))
-    node = maps[index]
-    chosen = number % block_count(node, graph)
-    return updated(node, block(node, chosen, graph), graph)
-
-
-def _update_around(
-    agent: Self, maps: Sequence[Map], graph: Graph, config: Config
-) -> list[Operation]:
-    """What is within reach of the agent."""
-    operations: list[Operation] = []
-    for node in maps:
-        away_m = math.hypot(agent.x_m - node.x_m, agent.y_m - node.y_m)
-        if away_m <= config.reach_m + math.hypot(node.width_m, node.height_m) / 2:
-            position_m = np.array([agent.x_m, agent.y_m])
-            near = cells_around(node, position_m, config.reach_m)
-            operations += updated(node, near, graph)
-
-    return operations

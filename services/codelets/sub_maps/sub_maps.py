@@ -12,6 +12,7 @@ from cogmap.services.codelets.sub_maps.labels import NEW, kept_labels
 from cogmap.services.codelets.sub_maps.mixture import (
     SPACING_SQUARES,
     SPACING_SUM,
+    SUB_MAP_SD_M,
     Mixture,
     Scene,
     rows_of,
@@ -61,7 +62,7 @@ class SubMaps:
         self._centre_m = positions_m.mean(axis=0) if count else np.zeros(2)
 
         own_m = np.zeros(count) if clear_m is None else clear_m
-        self._near = Neighbourhood(positions_m, own_m, boundaries, config.sub_map_sd_m)
+        self._near = Neighbourhood(positions_m, own_m, boundaries, SUB_MAP_SD_M)
         self._rows = self._rows_of(positions_m, functions)
         self._set_spacings()
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from cogmap.schemas.base import PositiveMetres, PositiveShare, Share
+from cogmap.schemas.base import Share
 
 Hours = Annotated[float, Meta(ge=0, le=1e4)]
 
@@ -15,62 +15,37 @@ Hours = Annotated[float, Meta(ge=0, le=1e4)]
 class EpisodicConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """How long episodes last, which of them are kept, and when one is recalled."""
 
-    place_m: Annotated[
-        PositiveMetres,
-        Meta(
-            description="Distance from where an episode began at which the next one begins, in m, "
-            "above 0 to 1e4."
-        ),
-    ] = 10.0
-    learning_rate: Annotated[
-        Share,
-        Meta(
-            description="What a further broadcast adds to an episode's activation, times that of "
-            "the coalition, 0 to 1."
-        ),
-    ] = 0.02
     decay_per_h: Annotated[
         Share,
         Meta(
             description="What an episode in Transient Episodic Memory loses of its activation in "
-            "an hour, 0 to 1. LIDA: they last for hours, up to a day, by no published rate that "
+            "an hour. LIDA: they last for hours, up to a day, by no published rate that "
             "we know; here 0.1, because what was fully active then lasts for 10 h."
         ),
     ] = 0.1
     consolidation_h: Annotated[
         Hours,
         Meta(
-            description="Age from which on an episode that is still active is consolidated, in h, "
-            "0 to 1e4. Those of earlier runs are when the next one begins."
+            description="Age from which on an episode that is still active is consolidated, in h. "
+            "Those of earlier runs are when the next one begins."
         ),
     ] = 1.0
-    consolidation_threshold: Annotated[
-        Share,
-        Meta(description="Activation from which on an episode is consolidated, 0 to 1."),
-    ] = 0.6
     max_declarative: Annotated[
         int,
         Meta(
             ge=1,
             le=100_000,
-            description="Episodes in Declarative Memory, 1 to 100000; beyond, the oldest are "
+            description="Episodes in Declarative Memory; beyond, the oldest are "
             "forgotten. Sparse distributed memory holds about 1000 with its defaults.",
         ),
     ] = 500
-    min_match: Annotated[
-        PositiveShare,
-        Meta(
-            description="How well an episode must match what is conscious to be recalled, above 0, "
-            "unrelated, to 1, the same. Half of the content at one place is 0.35."
-        ),
-    ] = 0.3
     recall_after_s: Annotated[
         float,
         Meta(
             ge=0,
             le=1e6,
             description="Time since its end after which an episode of this run may be recalled, "
-            "in s, 0 to 1e6.",
+            "in s",
         ),
     ] = 60.0
     refractory_cycles: Annotated[
@@ -78,6 +53,6 @@ class EpisodicConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_f
         Meta(
             ge=0,
             le=100_000,
-            description="Cycles after an episode was offered in which no other is, 0 to 100000.",
+            description="Cycles after an episode was offered in which no other is",
         ),
     ] = 50

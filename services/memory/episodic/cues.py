@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
-from cogmap.geometry.arrays import Bytes
 from cogmap.schemas.memory import StoredEpisode
 from cogmap.services.memory.episodic.encoding import cues, encoded
 from cogmap.services.memory.sparse.build import build
@@ -30,8 +29,7 @@ class Found(NamedTuple):
 class EpisodicCues:
     """Episodes, each stored at itself."""
 
-    def __init__(self, config: SparseConfig, place_m: float) -> None:
-        self._place_m = place_m
+    def __init__(self, config: SparseConfig) -> None:
         self._memory = build(config)
         self._items = ItemMemory(config.seed, self._memory.dimensions, self._memory.values)
         self._stored: CleanUpMemory[int] = CleanUpMemory(self._memory.values)
@@ -46,7 +44,7 @@ class EpisodicCues:
 
         lacking = sorted(set(episodes) - self._stored.keys)
         for number in lacking[:MAX_LEARNED]:
-            vector = encoded(episodes[number], self._items, self._place_m)
+            vector = encoded(episodes[number], self._items)
             self._memory.write(vector, vector)
             self._stored.put(number, vector)
 
@@ -55,18 +53,15 @@ class EpisodicCues:
         one beside it; None where it is none.
         """
         found = []
-        for vector in cues(cue, self._items, self._place_m):
+        for vector in cues(cue, self._items):
             recall = self._memory.read(vector)
             if recall is None:
                 continue
 
             number = self._stored.nearest(recall.vector, is_wanted)
             if number is not None:
-                found.append(Found(number, self._match(number, vector)))
+                apart = distance(self._stored.get(number), vector, self._memory.values)
+                match = 1.0 - apart / mean_distance(self._memory.dimensions, self._memory.values)
+                found.append(Found(number, min(1.0, max(0.0, match))))
 
         return max(found, key=lambda each: (each.match, each.number), default=None)
-
-    def _match(self, number: int, vector: Bytes) -> float:
-        apart = distance(self._stored.get(number), vector, self._memory.values)
-        match = 1.0 - apart / mean_distance(self._memory.dimensions, self._memory.values)
-        return min(1.0, max(0.0, match))

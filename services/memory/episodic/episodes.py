@@ -9,11 +9,14 @@ from typing import TypeGuard
 import msgspec
 
 from cogmap.schemas.memory import DeclarativeEpisode, StoredRecord, TransientEpisode
-from cogmap.services.memory.changes import Changes
 from cogmap.services.memory.episodic.config import EpisodicConfig
 from cogmap.services.memory.episodic.encoding import squares
+from cogmap.services.memory.storing import Changes
 
 HOUR_NS = 3_600_000_000_000
+
+CONSOLIDATED_ACTIVATION = 0.6
+"""Activation from which on an episode is consolidated; chosen, not tuned."""
 
 KeptEpisode = TransientEpisode | DeclarativeEpisode
 
@@ -83,18 +86,23 @@ class Episodes:
             level = self._activation(episode, ends_ns[episode.run])
             age_ns = now_ns - episode.until_ns
             is_over = episode.run != run or age_ns >= self._config.consolidation_h * HOUR_NS
-            if is_over and level >= self._config.consolidation_threshold:
-                self.put(_declarative(episode))
+            if is_over and level >= CONSOLIDATED_ACTIVATION:
+                names = DeclarativeEpisode.__struct_fields__
+                kept = {name: getattr(episode, name) for name in names}
+                self.put(DeclarativeEpisode(**kept))
             elif episode.run != run or level <= 0.0:
                 self.forget(episode.number)
 
-        self._forget_oldest()
+        # Declarative Memory keeps the newest.
+        known = self._known.items()
+        numbers = sorted(number for number, each in known if isinstance(each, DeclarativeEpisode))
+        for number in numbers[: -self._config.max_declarative]:
+            self.forget(number)
 
     def relocate(self, moved: Callable[[KeptEpisode], KeptEpisode | None]) -> set[int]:
         """Put episodes elsewhere, or forget them where that is None. The numbers of those whose
         vectors are others now.
         """
-        place_m = self._config.place_m
         relocated = set()
         for episode in list(self._known.values()):
             after = moved(episode)
@@ -107,7 +115,7 @@ class Episodes:
                 continue
 
             self.put(after)
-            if squares(after, place_m) != squares(episode, place_m):
+            if squares(after) != squares(episode):
                 relocated.add(episode.number)
 
         return relocated
@@ -120,16 +128,6 @@ class Episodes:
         self._forgotten = []
         return changes
 
-    def _forget_oldest(self) -> None:
-        """Keep no more in Declarative Memory than it may hold."""
-        numbers = sorted(
-            number
-            for number, episode in self._known.items()
-            if isinstance(episode, DeclarativeEpisode)
-        )
-        for number in numbers[: -self._config.max_declarative]:
-            self.forget(number)
-
     def _activation(self, episode: TransientEpisode, now_ns: int) -> float:
         """Linear decay, as in LIDA's framework."""
         hours = max(0, now_ns - episode.active_ns) / HOUR_NS
@@ -139,9 +137,3 @@ class Episodes:
 def is_episode(record: StoredRecord) -> TypeGuard[KeptEpisode]:
     """Whether a record is of an episode, in either memory."""
     return isinstance(record, KeptEpisode)
-
-
-def _declarative(episode: TransientEpisode) -> DeclarativeEpisode:
-    """The same episode, which decays no more."""
-    names = DeclarativeEpisode.__struct_fields__
-    return DeclarativeEpisode(**{name: getattr(episode, name) for name in names})

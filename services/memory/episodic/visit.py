@@ -18,6 +18,7 @@ from cogmap.schemas.nodes import (
     kind_of,
     look_of,
 )
+from cogmap.services.memory.episodic.encoding import PLACE_M
 
 Name = tuple[str, str]
 Position = tuple[float, float]
@@ -46,9 +47,9 @@ class Visit:
         """Whether anything was conscious here beside the agent itself."""
         return bool(self._counts)
 
-    def goes_on(self, at_m: Position, place_m: float) -> bool:
+    def includes(self, at_m: Position) -> bool:
         """Whether the agent at `at_m` is still at this place."""
-        return math.dist(at_m, self.at_m) <= place_m
+        return math.dist(at_m, self.at_m) <= PLACE_M
 
     def add(self, broadcast: Broadcast) -> None:
         """Take in what a broadcast is about."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import msgspec
 
@@ -21,6 +21,11 @@ from cogmap.schemas.nodes import (
 from cogmap.services.memory.config import Config
 
 Position = tuple[float, float]
+
+CUE_WITHIN_M = 50.0
+"""Distance from the agent, or from an object that is conscious, within which an object comes back:
+somewhat farther than it is seen from.
+"""
 
 
 class ObjectCues:
@@ -50,18 +55,23 @@ class ObjectCues:
         found = []
         for node in forgotten:
             away_m = min(math.dist(cue_m, (node.x_m, node.y_m)) for cue_m in cues_m)
-            is_near = away_m <= self._config.cue_within_m
-            if is_near and self._may_return(node, present):
+            if away_m > CUE_WITHIN_M or is_among(node, present):
+                continue
+            if not {object_id(node.label), percept_id(node.label)} & self._graph.nodes.keys():
                 found.append((away_m, node.label, node))
 
+        # As they were known, expected to be where they stood.
         found.sort(key=lambda each: each[:2])
-        return [_returned(node) for _, _, node in found[: self._config.max_returned]]
+        return [
+            msgspec.structs.replace(node, activation=0.0, salience=0.0, cycle=0, misses=0)
+            for _, _, node in found[: self._config.max_returned]
+        ]
 
     def _places_m(self, cycle: int) -> list[Position]:
         """Where the agent knows to be, and where what was broadcast before `cycle` stands."""
         places_m = []
         agent = self._graph.agent
-        if agent is not None and agent.map == ROOT_MAP and not agent.is_lost:
+        if agent is not None and agent.map == ROOT_MAP and not agent.misfits.is_lost:
             places_m.append((agent.x_m, agent.y_m))
 
         names = {name for number, name in self._conscious if number < cycle}
@@ -72,13 +82,3 @@ class ObjectCues:
                 places_m.append((node.x_m, node.y_m))
 
         return places_m
-
-    def _may_return(self, node: Object, present: Iterable[Object]) -> bool:
-        """Whether nothing has its label, and none of its look stands there."""
-        has_label = {object_id(node.label), percept_id(node.label)} & self._graph.nodes.keys()
-        return not has_label and not is_among(node, present)
-
-
-def _returned(node: Object) -> Object:
-    """An object as it was known, expected to be where it stood."""
-    return msgspec.structs.replace(node, activation=0.0, salience=0.0, cycle=0, misses=0)

@@ -12,7 +12,6 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph import decay
 from cogmap.graph.graph import Graph
@@ -31,10 +30,15 @@ from cogmap.schemas.nodes import (
     look_of,
     object_id,
 )
-from cogmap.services.memory.config import Config
+from cogmap.services.memory.config import MIN_SIGHTINGS
 from cogmap.services.memory.episodic.corrections import Corrections, Shift
 
 ROUNDING = 1e-9
+LEARNED_BASE_LEVEL = 0.3
+"""Base level from which on an object that the workspace forgets by time alone was learned. The
+second view gives 0.15, and two broadcasts the rest; with less, what is placed badly would come back
+too.
+"""
 
 
 class ForgottenObjects:
@@ -42,8 +46,7 @@ class ForgottenObjects:
     were last seen or conscious. Their labels are none of those that are stored of the graph.
     """
 
-    def __init__(self, config: Config, graph: Graph) -> None:
-        self._config = config
+    def __init__(self, graph: Graph) -> None:
         self._graph = graph
         self._present: dict[str, Object] = {}
         self._learned: set[str] = set()
@@ -75,7 +78,9 @@ class ForgottenObjects:
 
         self._corrections.note(delta.operations)
         for rows in self._corrections.take():
-            self._correct(rows)
+            if self._forgotten:
+                places_m = [(node.x_m, node.y_m) for node in self._forgotten.values()]
+                self._move(Shift(rows)(places_m))
 
     def note_all(self, stored: StoredObjects | None) -> None:
         """Take up a graph that was loaded as a whole: what is missing in it, of what was present
@@ -107,15 +112,19 @@ class ForgottenObjects:
             return
 
         self._present[node.id] = node
-        if node.base_level >= self._config.learned_base_level:
+        if node.base_level >= LEARNED_BASE_LEVEL:
             self._learned.add(node.id)
         if before is not None:
-            self._note_level(before, node)
-        if self._is_stored(node):
-            self._give_way(node)
+            # Unlearned as missing, or conscious as present since.
+            level = decay.base_level(before, node.cycle, self._graph.decay)
+            if node.base_level < level - ROUNDING:
+                self._missing.add(node.id)
+            elif node.base_level > level + ROUNDING:
+                self._missing.discard(node.id)
+        if not self._is_stored(node):
+            return
 
-    def _give_way(self, node: Object) -> None:
-        """Keep none that came back or was learned anew as `node`, and no other by its label."""
+        # None is kept that came back or was learned anew as this, and no other by its label.
         for label, kept in list(self._forgotten.items()):
             if is_same(kept, node):
                 del self._forgotten[label]
@@ -123,14 +132,6 @@ class ForgottenObjects:
         namesake = self._forgotten.pop(node.label, None)
         if namesake is not None:
             self._put(namesake)
-
-    def _note_level(self, before: Object, node: Object) -> None:
-        """Note whether an object was unlearned as missing, or has been conscious as present."""
-        level = decay.base_level(before, node.cycle, self._graph.decay)
-        if node.base_level < level - ROUNDING:
-            self._missing.add(node.id)
-        elif node.base_level > level + ROUNDING:
-            self._missing.discard(node.id)
 
     def _drop(self, name: str, has_decayed: bool) -> None:
         node = self._present.pop(name, None)
@@ -146,7 +147,7 @@ class ForgottenObjects:
 
     def _is_stored(self, node: Object) -> bool:
         """Whether an object of the graph was seen often enough to be stored."""
-        return node.sightings >= self._config.min_sightings
+        return node.sightings >= MIN_SIGHTINGS
 
     def _put(self, node: Object) -> None:
         """Keep an object under its label, or the first that is free."""
@@ -156,16 +157,10 @@ class ForgottenObjects:
             number += 1
             label = individual_label(look_of(label), number)
 
-        level = max(node.base_level, self._config.learned_base_level)
+        level = max(node.base_level, LEARNED_BASE_LEVEL)
         self._forgotten[label] = msgspec.structs.replace(
             node, id=object_id(label), label=label, base_level=level
         )
-
-    def _correct(self, rows: Floats) -> None:
-        """Move them as a correction, (n, 7), states."""
-        if self._forgotten:
-            places_m = [(node.x_m, node.y_m) for node in self._forgotten.values()]
-            self._move(Shift(rows)(places_m))
 
     def _enter(self, frame: str) -> None:
         """Follow the root map into the frame of the recalled map of that name, which was joined to

@@ -27,7 +27,6 @@ class BinaryMemory:
         addresses = random_vectors(rng, config.hard_locations, DIMENSIONS, VALUES)
         self._codes = bit_codes(addresses)
         self._counters: npt.NDArray[np.int8] = np.zeros(addresses.shape, np.int8)
-        self._max_reads = config.max_reads
 
     @property
     def dimensions(self) -> int:
@@ -60,7 +59,7 @@ class BinaryMemory:
 
     def read(self, cue: Bytes) -> Recall | None:
         """Read with what was read, until that does not change; None where a read finds nothing."""
-        return iterated_read(self.read_once, cue, self._max_reads)
+        return iterated_read(self.read_once, cue)
 
     def _is_active(self, cue: Bytes) -> Booleans:
         (code,) = bit_codes(cue[None])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from cogmap.services.memory.sparse.binary import BinaryMemory
 from cogmap.services.memory.sparse.config import SparseConfig
 from cogmap.services.memory.sparse.interface import AssociativeMemory
-from cogmap.services.memory.sparse.memory import SparseMemory
+from cogmap.services.memory.sparse.modular import ModularMemory
 
 
 def build(config: SparseConfig) -> AssociativeMemory:
@@ -13,4 +13,4 @@ def build(config: SparseConfig) -> AssociativeMemory:
     if config.kind == "binary":
         return BinaryMemory(config)
 
-    return SparseMemory(config)
+    return ModularMemory(config)

@@ -22,40 +22,21 @@ class SparseConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fie
     ] = "modular"
     hard_locations: Annotated[
         int,
-        msgspec.Meta(ge=1000, le=100_000, description="Hard locations, 1000 to 100000."),
+        msgspec.Meta(ge=1000, le=100_000, description="Hard locations"),
     ] = 10_000
     dimensions: Annotated[
         int,
         msgspec.Meta(
             ge=64,
             le=8192,
-            description="Dimensions of a modular memory's vectors, 64 to 8192.",
+            description="Dimensions of a modular memory's vectors",
         ),
     ] = 1024
-    activated_share: Annotated[
-        float,
-        msgspec.Meta(
-            ge=0.01,
-            le=0.5,
-            description="Share of a modular memory's hard locations that a cue activates, 0.01 to "
-            "0.5. LIDA: 0.001, by a radius of 451 of 1000 bits; here 0.07, because the nearest of "
-            "them count most: of 500 maps, each stored once, cues with 30 % of their dimensions "
-            "corrupted recall all, and with 0.01 89 %.",
-        ),
-    ] = 0.07
-    max_reads: Annotated[
-        int,
-        msgspec.Meta(
-            ge=1,
-            le=1000,
-            description="Reads after which an iterated read ends, converged or not, 1 to 1000.",
-        ),
-    ] = 19
     seed: Annotated[
         int,
         msgspec.Meta(
             ge=0,
             le=2**62,
-            description="Seed of the addresses of the hard locations, 0 to 2**62.",
+            description="Seed of the addresses of the hard locations",
         ),
     ] = 0

@@ -10,6 +10,9 @@ import numpy as np
 
 from cogmap.geometry.arrays import Bytes
 
+MAX_READS = 19
+"""Reads after which an iterated read ends, converged or not (LIDA)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Recall:
@@ -55,7 +58,7 @@ class AssociativeMemory(Protocol):
 
 
 def iterated_read(
-    read_once: Callable[[Bytes], Bytes | None], cue: Bytes, max_reads: int
+    read_once: Callable[[Bytes], Bytes | None], cue: Bytes, max_reads: int = MAX_READS
 ) -> Recall | None:
     """Read at `cue`, then at what was read (Kanerva 1988), up to `max_reads` times."""
     vector = cue

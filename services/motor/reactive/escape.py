@@ -4,24 +4,23 @@ from __future__ import annotations
 
 import msgspec
 
+from cogmap.robot import WHEEL_RADIUS_M
 from cogmap.schemas.sensing import MotorCommand, SpeedLimit
-from cogmap.services.motor.config import Config
 
-PATIENCE_S = 2.0
+HALTED_S = 2.0
 BACK_S = 2.0
 BACK_M_S = 0.4
 
 
 class Escape:
-    """Lets the robot back away for BACK_S where it is stuck, or was halted by an obstacle for
-    PATIENCE_S.
+    """Lets the robot back away for BACK_S if it is stuck, or was halted by an obstacle for
+    HALTED_S.
 
     It came from there, so that the ground behind it is free; a new plan leads round what the scan
     has put on the map meanwhile.
     """
 
-    def __init__(self, config: Config) -> None:
-        self._wheel_rad_s = -BACK_M_S / config.wheel_radius_m
+    def __init__(self) -> None:
         self._halted_since_ns: int | None = None
         self._until_ns = -1
 
@@ -34,20 +33,17 @@ class Escape:
             self._halted_since_ns = now_ns
 
         since_ns = self._halted_since_ns
-        has_waited = since_ns is not None and now_ns - since_ns >= PATIENCE_S * 1e9
+        has_waited = since_ns is not None and now_ns - since_ns >= HALTED_S * 1e9
         if is_stuck or has_waited:
             self._until_ns = now_ns + round(BACK_S * 1e9)
             self._halted_since_ns = None
-
         if now_ns >= self._until_ns:
             return wanted
-        return self._back(wanted, SpeedLimit.STUCK if is_stuck else SpeedLimit.OBSTACLE)
 
-    def _back(self, wanted: MotorCommand, limit: SpeedLimit) -> MotorCommand:
         return msgspec.structs.replace(
             wanted,
-            left_wheel_rad_s=self._wheel_rad_s,
-            right_wheel_rad_s=self._wheel_rad_s,
+            left_wheel_rad_s=-BACK_M_S / WHEEL_RADIUS_M,
+            right_wheel_rad_s=-BACK_M_S / WHEEL_RADIUS_M,
             halted_by=SpeedLimit.NONE,
-            slowed_by=limit,
+            slowed_by=SpeedLimit.STUCK if is_stuck else SpeedLimit.OBSTACLE,
         )

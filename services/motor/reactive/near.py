@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from cogmap.geometry.se2 import compose, transform_to
+from cogmap.geometry.se2 import moved_by, transform_to
 from cogmap.robot import NEAREST_SCAN_M
 from cogmap.schemas.sensing import RangeScan, SelfMotion
 
@@ -55,10 +55,14 @@ class NearObstacles:
         same view, also where it arrived earlier.
         """
         self._moved_ns = motion.stamp_ns
-        pose = _moved(motion)
+        pose = moved_by(np.zeros(3), np.asarray(motion.motions.numpy(), np.float64))
         self._is_still = bool(np.hypot(pose[0], pose[1]) <= STILL_M and abs(pose[2]) <= STILL_RAD)
         if len(self._points_m):
-            self._move(pose, motion.stamp_ns)
+            moved_m = transform_to(pose, self._points_m)
+            age_ns = motion.stamp_ns - self._stamps_ns
+            is_near = np.hypot(*moved_m.T) <= FARTHEST_M
+            is_beside = moved_m[:, 0] >= -REMEMBERED_M
+            self._keep(moved_m, is_near & is_beside & (age_ns <= REMEMBERED_S * 1e9))
 
         early = self._early
         if early is not None and early.stamp_ns <= self._moved_ns:
@@ -71,13 +75,6 @@ class NearObstacles:
             self._add(scan)
         else:
             self._early = scan
-
-    def _move(self, pose: Floats, stamp_ns: int) -> None:
-        moved_m = transform_to(pose, self._points_m)
-        age_ns = stamp_ns - self._stamps_ns
-        is_near = np.hypot(*moved_m.T) <= FARTHEST_M
-        is_beside = moved_m[:, 0] >= -REMEMBERED_M
-        self._keep(moved_m, is_near & is_beside & (age_ns <= REMEMBERED_S * 1e9))
 
     def _add(self, scan: RangeScan) -> None:
         bearing_rad = np.asarray(scan.bearing_rad.numpy(), np.float64)
@@ -121,7 +118,11 @@ class NearObstacles:
         """The curvature nearest to the one that is wanted whose arc leads past all that is near;
         None where none does.
         """
-        near_m = self._certain_m()
+        # Near enough to matter, and seen in MIN_SCANS scans or suddenly.
+        is_near = np.hypot(*self._points_m.T) <= ARC_M + self._clearance_m + SAME_M
+        points_m = self._points_m[is_near]
+        scans = _scans_near(points_m, points_m, self._stamps_ns[is_near])
+        near_m = points_m[(scans >= MIN_SCANS) | self._is_sure[is_near]]
         if not len(near_m):
             return wanted_per_m
 
@@ -136,17 +137,6 @@ class NearObstacles:
 
         change_per_m = np.where(is_clear, np.abs(per_m - wanted_per_m), np.inf)
         return float(per_m[change_per_m.argmin()])
-
-    def _certain_m(self) -> Floats:
-        """(n, 2): what is near enough to matter, and was seen in MIN_SCANS scans or suddenly."""
-        reach_m = ARC_M + self._clearance_m
-        is_near = np.hypot(*self._points_m.T) <= reach_m + SAME_M
-        points_m = self._points_m[is_near]
-        stamps_ns = self._stamps_ns[is_near]
-        scans = _scans_near(points_m, points_m, stamps_ns)
-
-        certain_m: Floats = points_m[(scans >= MIN_SCANS) | self._is_sure[is_near]]
-        return certain_m
 
     def _is_seen_through(self, bearing_rad: Floats, range_m: Floats) -> Booleans:
         """(n,): which remembered points lie before what a scan sees in their direction and to both
@@ -167,8 +157,11 @@ class NearObstacles:
         sector = order[place]
         is_in_view = np.abs(direction_rad - bearing_rad[sector]) <= half_rad
 
+        ordered_m = range_m[order]
+        beside_m = np.pad(np.where(ordered_m > 0, ordered_m, np.inf), 1, constant_values=np.inf)
+        nearest_beside_m = np.minimum(beside_m[:-2], beside_m[2:])
         distance_m = np.hypot(x_m, y_m)
-        seen_m = np.minimum(range_m[sector], _least_beside_m(range_m[order])[place])
+        seen_m = np.minimum(range_m[sector], nearest_beside_m[place])
         sees_farther = seen_m > distance_m + BEHIND_M
         is_through = is_in_view & sees_farther & (distance_m >= NEAREST_SCAN_M)
         return np.asarray(is_through, np.bool_)
@@ -190,17 +183,6 @@ def _scans_near(points_m: Floats, hits_m: Floats, stamps_ns: Indices) -> Indices
         scans += is_same[:, stamps_ns == stamp_ns].any(axis=1)
 
     return scans
-
-
-def _moved(motion: SelfMotion) -> Floats:
-    """(3,): the pose that a motion leads to, from where it began."""
-    pose = np.zeros(3)
-    rows = np.asarray(motion.motions.numpy(), np.float64)
-    for speed_m_s, turn_rad_s, duration_s in rows[:, :3].tolist():
-        step = np.array([speed_m_s * duration_s, 0.0, turn_rad_s * duration_s])
-        pose = compose(pose, step)
-
-    return pose
 
 
 def _hits_m(bearing_rad: Floats, range_m: Floats) -> Floats:
@@ -250,14 +232,6 @@ def _ends_m(bearing_rad: Floats, range_m: Floats) -> Floats:
 
 def _points_m(bearing_rad: Floats, range_m: Floats) -> Floats:
     return np.column_stack([range_m * np.cos(bearing_rad), range_m * np.sin(bearing_rad)])
-
-
-def _least_beside_m(range_m: Floats) -> Floats:
-    """(n,): the least of the ranges to both sides of each; infinite where nothing was seen."""
-    known_m = np.where(range_m > 0, range_m, np.inf)
-    padded_m = np.pad(known_m, 1, constant_values=np.inf)
-    least_m: Floats = np.minimum(padded_m[:-2], padded_m[2:])
-    return least_m
 
 
 def _least_distances_m(per_m: Floats, points_m: Floats) -> Floats:

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.schemas.sensing import SelfMotion
 
-MIN_COMMANDED = 3.0
+STUCK_M_S = 0.1
+MIN_COMMANDED_M_S = 3 * STUCK_M_S
 MIN_TURN_RAD_S = 0.05
 
 
-class Speeds(NamedTuple):
-    """Mean speed and mean turn rate over some time, both without sign."""
-
-    speed_m_s: float
-    turn_rad_s: float
-
-
 class StuckDetector:
-    """The robot is stuck when it has been slower than `stuck_m_s` for `after_s`, while the commands
-    were MIN_COMMANDED times as fast at least.
+    """Takes the robot for stuck when it has been slower than STUCK_M_S for `after_s`, while it was
+    commanded to drive at MIN_COMMANDED_M_S at least.
     """
 
-    def __init__(self, stuck_m_s: float, after_s: float) -> None:
-        self._stuck_m_s = stuck_m_s
+    def __init__(self, after_s: float) -> None:
         self._after_ns = round(after_s * 1e9)
         self._commanded_m_s = 0.0
         self._standing_since_ns: int | None = None
@@ -39,44 +30,25 @@ class StuckDetector:
         self._commanded_m_s = speed_m_s
 
     def on_motion(self, motion: SelfMotion) -> None:
-        """Compare a self-motion with the last command. Raises MessageError where its rows are not
-        of five columns.
+        """Compare a self-motion with the last command. Raises MessageError if its rows are not of
+        five columns.
         """
-        if self._is_moving(motion) or not self._is_commanded:
+        shape = motion.motions.shape
+        if len(shape) != 2 or shape[1] != 5:
+            raise MessageError(f"self-motion: expected rows of 5 columns, got an array of {shape}")
+
+        speed_m_s, turn_rad_s, dt_s = np.asarray(motion.motions.numpy(), float)[:, :3].T
+        duration_s = float(dt_s.sum())
+        distance_m = float(np.abs(speed_m_s * dt_s).sum())
+        turn_rad = float(np.abs(turn_rad_s * dt_s).sum())
+        is_travelling = distance_m >= STUCK_M_S * duration_s
+        is_turning = turn_rad >= MIN_TURN_RAD_S * duration_s
+        is_moving = duration_s > 0.0 and (is_travelling or is_turning)
+
+        if is_moving or self._commanded_m_s < MIN_COMMANDED_M_S:
             self._standing_since_ns = None
         elif self._standing_since_ns is None:
             self._standing_since_ns = motion.since_ns
 
         since_ns = self._standing_since_ns
-        if since_ns is None:
-            self.is_stuck = False
-        else:
-            self.is_stuck = motion.stamp_ns - since_ns >= self._after_ns
-
-    @property
-    def _is_commanded(self) -> bool:
-        return self._commanded_m_s >= MIN_COMMANDED * self._stuck_m_s
-
-    def _is_moving(self, motion: SelfMotion) -> bool:
-        speeds = _mean_speeds(motion)
-        is_travelling = speeds.speed_m_s >= self._stuck_m_s
-        is_turning = speeds.turn_rad_s >= MIN_TURN_RAD_S
-
-        return is_travelling or is_turning
-
-
-def _mean_speeds(motion: SelfMotion) -> Speeds:
-    shape = motion.motions.shape
-    if len(shape) != 2 or shape[1] != 5:
-        raise MessageError(f"self-motion: expected rows of 5 columns, got an array of {shape}")
-
-    rows = np.asarray(motion.motions.numpy(), float)
-    duration_s = float(rows[:, 2].sum())
-    if duration_s <= 0.0:
-        return Speeds(0.0, 0.0)
-
-    speed_m_s, turn_rate_rad_s, dt_s = rows[:, :3].T
-    distance_m = float(np.abs(speed_m_s * dt_s).sum())
-    turn_rad = float(np.abs(turn_rate_rad_s * dt_s).sum())
-
-    return Speeds(distance_m / duration_s, turn_rad / duration_s)
+        self.is_stuck = since_ns is not None and motion.stamp_ns - since_ns >= self._after_ns

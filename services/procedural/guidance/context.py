@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from cogmap.schemas.base import Scalar
@@ -36,15 +36,25 @@ class Fit(NamedTuple):
     activation: float
     motion: Motion
 
+    @property
+    def rank(self) -> tuple[float, float, str]:
+        """The order in which schemes come to mind."""
+        return -self.activation, -reliability(self.scheme), self.scheme.name
+
     def behaviour(self, seen_ns: int) -> Behaviour:
         """What the scheme becomes by a view of that stamp."""
         scheme = self.scheme
-        path_m = [self.motion.moved(complex(*place_m)) for place_m in scheme.path_m]
+        parameters: dict[str, Scalar] = {SEEN_NS: seen_ns}
+        for number, path_m in enumerate(scheme.path_m, start=1):
+            place_m = self.motion.moved(complex(*path_m))
+            parameters[f"ahead_{number}_m"] = place_m.real
+            parameters[f"left_{number}_m"] = place_m.imag
+
         return Behaviour(
             scheme=scheme.name,
             activation=min(1.0, self.activation + SALIENCE),
             action=ActionName.GUIDE,
-            parameters=_parameters(path_m, seen_ns),
+            parameters=parameters,
             context=dict(self.context),
             adding={RESULT: SALIENCE},
             reliability=reliability(scheme),
@@ -69,7 +79,9 @@ def fit(
 
     motion, agreeing = found
     names = list(relations)
-    closeness = _closeness(motion)
+    away = abs(motion.origin_before()) / HALF_AWAY_M
+    turned = motion.turn_rad / HALF_TURNED_RAD
+    closeness = 1.0 / (1.0 + away**2 + turned**2)
     context = {_spelled(landmark): 0.0 for landmark in scheme.landmarks}
     for pair in agreeing:
         landmark = scheme.landmarks[pair.number]
@@ -77,15 +89,6 @@ def fit(
 
     activation = sum(context.values()) / max(ENOUGH, len(scheme.landmarks))
     return Fit(scheme, context, activation, motion)
-
-
-def _parameters(path_m: Sequence[complex], seen_ns: int) -> dict[str, Scalar]:
-    """The parameters of the action that drives a path, of which the agent is at the start."""
-    parameters: dict[str, Scalar] = {SEEN_NS: seen_ns}
-    for number, place_m in enumerate(path_m, start=1):
-        parameters[f"ahead_{number}_m"] = place_m.real
-        parameters[f"left_{number}_m"] = place_m.imag
-    return parameters
 
 
 def end_of(parameters: Mapping[str, Scalar]) -> complex | None:
@@ -96,12 +99,6 @@ def end_of(parameters: Mapping[str, Scalar]) -> complex | None:
     if not isinstance(ahead_m, int | float) or not isinstance(left_m, int | float):
         return None
     return complex(ahead_m, left_m)
-
-
-def _closeness(motion: Motion) -> float:
-    away = abs(motion.origin_before()) / HALF_AWAY_M
-    turned = motion.turn_rad / HALF_TURNED_RAD
-    return 1.0 / (1.0 + away**2 + turned**2)
 
 
 def _spelled(landmark: Relation) -> str:

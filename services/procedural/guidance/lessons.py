@@ -11,6 +11,9 @@ from typing import NamedTuple
 from cogmap.schemas.cognition import Relation
 from cogmap.schemas.nodes import NEVER_NS, Self
 
+# Chosen on routes in a town of blocks that were driven once (`benchmarks cognition`).
+STEP_M = 1.5
+AHEAD_M = 40.0
 TURNED_RAD = 0.3
 STOP_NS = 5_000_000_000
 MAX_LANDMARKS = 6
@@ -29,8 +32,8 @@ class Place(NamedTuple):
     @staticmethod
     def of(agent: Self) -> Place:
         """That of a self node."""
-        at_m = complex(agent.odometry_x_m, agent.odometry_y_m)
-        return Place(at_m, agent.odometry_heading_rad)
+        at_m = complex(agent.odometry.x_m, agent.odometry.y_m)
+        return Place(at_m, agent.odometry.heading_rad)
 
     def to(self, other_m: complex) -> complex:
         """Another position, metres ahead + metres left x i as seen from here."""
@@ -49,8 +52,8 @@ class Lesson(NamedTuple):
 
 
 @dataclass
-class _Begun:
-    """A lesson that goes on: from which place and how far along the drive it began, and the path
+class Begun:
+    """A lesson that continues: from which place and how far along the drive it began, and the path
     since.
     """
 
@@ -59,19 +62,23 @@ class _Begun:
     driven_m: float
     path_m: list[complex]
 
+    def ended(self, place: Place) -> Lesson:
+        """The lesson that ends at a place."""
+        return Lesson(self.landmarks, [*self.path_m, self.place.to(place.at_m)])
+
 
 class Lessons:
     """Begins a lesson every `step_m` of a drive, and each time that the agent has turned.
 
-    A lesson ends `ahead_m` further on, or later where no landmarks are seen meanwhile; and where
-    the agent stays for STOP_NS. A shorter stop is part of the drive.
+    A lesson ends `ahead_m` further on, or later if no landmarks are seen meanwhile; and if the
+    agent stays for STOP_NS. A shorter stop is part of the drive.
     """
 
-    def __init__(self, step_m: float, ahead_m: float) -> None:
+    def __init__(self, step_m: float = STEP_M, ahead_m: float = AHEAD_M) -> None:
         self._step_m = step_m
         self._ahead_m = ahead_m
-        self._begun: deque[_Begun] = deque()
-        self._last: _Begun | None = None
+        self._begun: deque[Begun] = deque()
+        self._last: Begun | None = None
         self._seen_ns = NEVER_NS
         self._place: Place | None = None
         self._driven_m = 0.0
@@ -90,65 +97,47 @@ class Lessons:
         if self._place is not None:
             self._driven_m += abs(place.at_m - self._place.at_m)
         self._place = place
-        self._mark(place)
+
+        if self._driven_m - self._marked_m >= MARKED_M:
+            self._marked_m = self._driven_m
+            for begun in self._begun:
+                if len(begun.path_m) < MAX_MARKS:
+                    begun.path_m.append(begun.place.to(place.at_m))
 
         if not drives:
-            return self._ended_by_stop(agent.stamp_ns, place)
+            if self._stopped_ns is None:
+                self._stopped_ns = agent.stamp_ns
+            if agent.stamp_ns - self._stopped_ns < STOP_NS:
+                return []
+
+            stopped = [begun.ended(place) for begun in self._begun]
+            self._begun.clear()
+            self._last = None
+            return stopped
 
         self._stopped_ns = None
         self._begin(place, relations)
-        return self._ended(place)
-
-    def _mark(self, place: Place) -> None:
-        """Note where the path of all lessons leads."""
-        if self._driven_m - self._marked_m < MARKED_M:
-            return
-
-        self._marked_m = self._driven_m
-        for begun in self._begun:
-            if len(begun.path_m) < MAX_MARKS:
-                begun.path_m.append(begun.place.to(place.at_m))
-
-    def _ended_by_stop(self, stamp_ns: int, place: Place) -> list[Lesson]:
-        if self._stopped_ns is None:
-            self._stopped_ns = stamp_ns
-        if stamp_ns - self._stopped_ns < STOP_NS:
-            return []
-
-        ended = [_lesson(begun, place) for begun in self._begun]
-        self._begun.clear()
-        self._last = None
+        ended = []
+        while self._begun and self._last is not None:
+            # The agent is far enough on, and has begun another lesson meanwhile.
+            first_m = self._begun[0].driven_m
+            is_far = self._driven_m - first_m >= self._ahead_m
+            if not is_far or self._last.driven_m - first_m < self._ahead_m / 2:
+                break
+            ended.append(self._begun.popleft().ended(place))
         return ended
 
     def _begin(self, place: Place, relations: Iterable[Relation]) -> None:
+        """Begin a lesson, if it is time and there are landmarks; with one alone after a while."""
         nearest = sorted(relations, key=lambda each: (each.range_m, each.look))[:MAX_LANDMARKS]
-        last = self._last
-        since_m = self._driven_m if last is None else self._driven_m - last.driven_m
-        is_far = last is None or since_m >= self._step_m or _has_turned(last.place, place)
-        is_blind = last is None or since_m >= BLIND_SHARE * self._ahead_m
+        is_far = is_blind = True
+        if self._last is not None:
+            since_m = self._driven_m - self._last.driven_m
+            turn = cmath.rect(1.0, place.heading_rad - self._last.place.heading_rad)
+            is_far = since_m >= self._step_m or abs(cmath.phase(turn)) >= TURNED_RAD
+            is_blind = since_m >= BLIND_SHARE * self._ahead_m
         if not is_far or len(nearest) < (1 if is_blind else ENOUGH_LANDMARKS):
             return
 
-        self._last = _Begun(nearest, place, self._driven_m, [0j])
+        self._last = Begun(nearest, place, self._driven_m, [0j])
         self._begun.append(self._last)
-
-    def _ended(self, place: Place) -> list[Lesson]:
-        ended = []
-        while self._begun and self._is_over(self._begun[0]):
-            ended.append(_lesson(self._begun.popleft(), place))
-        return ended
-
-    def _is_over(self, begun: _Begun) -> bool:
-        """Whether the agent is far enough on, and has begun another lesson on the way."""
-        assert self._last is not None
-        is_far = self._driven_m - begun.driven_m >= self._ahead_m
-        return is_far and self._last.driven_m - begun.driven_m >= self._ahead_m / 2
-
-
-def _has_turned(before: Place, now: Place) -> bool:
-    turn = cmath.rect(1.0, now.heading_rad - before.heading_rad)
-    return abs(cmath.phase(turn)) >= TURNED_RAD
-
-
-def _lesson(begun: _Begun, place: Place) -> Lesson:
-    return Lesson(begun.landmarks, [*begun.path_m, begun.place.to(place.at_m)])

@@ -14,7 +14,7 @@ from cogmap.schemas.cognition import (
     GuidanceScheme,
     Relation,
 )
-from cogmap.schemas.nodes import Object, Self, object_id
+from cogmap.schemas.nodes import Object, PathIntegration, Self, object_id
 from cogmap.testing import PERIOD_NS, agent
 
 TOWN_M = {"bakery": 20 + 5j, "school": 25 - 8j, "library": 40 + 2j, "museum": 60 - 6j}
@@ -48,9 +48,7 @@ def driven(at_m: complex = 0j, heading_rad: float = 0.0, cycle: int = 1) -> Self
     """An agent that has come there by path integration."""
     return agent(
         stamp_ns=cycle * PERIOD_NS,
-        odometry_x_m=at_m.real,
-        odometry_y_m=at_m.imag,
-        odometry_heading_rad=heading_rad,
+        odometry=PathIntegration(x_m=at_m.real, y_m=at_m.imag, heading_rad=heading_rad),
     )
 
 

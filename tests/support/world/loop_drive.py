@@ -27,7 +27,6 @@ QUIET = WorkerConfig(
     heading_variance_per_rad=2e-3,
     revisit_s=5.0,
     closure_spacing_s=0.2,
-    waiting_share=0.0,
 )
 SLIP = 0.1
 TOWER = {"tower": (8.0, 5.0)}

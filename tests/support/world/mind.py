@@ -21,6 +21,7 @@ from cogmap.schemas.nodes import (
     AnyNode,
     Episode,
     Map,
+    Misfits,
     Object,
     object_id,
 )
@@ -87,7 +88,7 @@ class Mind:
                 coalition=Coalition(
                     codelet="whereabouts",
                     activation=0.5,
-                    nodes=[agent(x_m=x_m, y_m=y_m, is_lost=is_lost), *nodes],
+                    nodes=[agent(x_m=x_m, y_m=y_m, misfits=Misfits(is_lost=is_lost)), *nodes],
                     maps=[ROOT_MAP],
                 ),
             )

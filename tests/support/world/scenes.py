@@ -21,7 +21,7 @@ from cogmap.schemas.process import Clock, Presence
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.module import Config as WorkerConfig
 from cogmap.services.codelets.module import build as build_worker
-from cogmap.services.codelets.table import CODELETS
+from cogmap.services.codelets.table import own_codelets
 from cogmap.services.workspace.module import Config, build
 from cogmap.testing import Rows, percepts, run_codelet, self_motion
 from cogmap.testing.builders import STRAIGHT
@@ -35,7 +35,7 @@ def thing(name: str) -> Node:
 def configured(config: WorkerConfig | None = None) -> list[ConfiguredCodelet]:
     """All our codelets: with these settings, where they are of their kind."""
     settings = config or WorkerConfig()
-    return [ConfiguredCodelet(codelet, _settings(codelet, settings)) for codelet in CODELETS]
+    return [ConfiguredCodelet(codelet, _settings(codelet, settings)) for codelet in own_codelets()]
 
 
 def _settings(codelet: Codelet, settings: msgspec.Struct) -> msgspec.Struct:
@@ -45,7 +45,7 @@ def _settings(codelet: Codelet, settings: msgspec.Struct) -> msgspec.Struct:
 
 def run(asked: Task, graph: Graph, config: msgspec.Struct) -> Answer:
     """What the codelet of `asked` answers."""
-    (codelet,) = (codelet for codelet in CODELETS if codelet.name == asked.codelet)
+    (codelet,) = (codelet for codelet in own_codelets() if codelet.name == asked.codelet)
     return run_codelet(codelet, asked, graph, _settings(codelet, config))
 
 

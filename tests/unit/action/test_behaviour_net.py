@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import msgspec
 import pytest
 
-from cogmap.schemas.cognition import Behaviour
-from cogmap.services.action.behaviour_net import BehaviourNet
-from cogmap.services.action.config import Config
+from cogmap.schemas.cognition import Behaviour, Rejection
+from cogmap.services.action.behaviour_net import (
+    BROADCAST_EXCITATION,
+    CONFLICTOR_INHIBITION,
+    DECAY,
+    PREDECESSOR_EXCITATION,
+    SUCCESSOR_EXCITATION,
+    BehaviourNet,
+)
 from tests.support.world.behaviours import behaviour, lacking
-
-CONFIG = Config()
 
 
 def _gathered(net: BehaviourNet, *behaviours: Behaviour) -> dict[str, float]:
@@ -23,18 +28,18 @@ def _silent(scheme: str, activation: float = 1.0, **facts: object) -> Behaviour:
 
 
 def test_a_behaviour_is_excited_by_a_broadcast_of_its_context() -> None:
-    gathered = _gathered(BehaviourNet(CONFIG), behaviour("dock", context={"a": 1.0, "b": 0.5}))
+    gathered = _gathered(BehaviourNet(), behaviour("dock", context={"a": 1.0, "b": 0.5}))
 
-    assert gathered["dock"] == pytest.approx(CONFIG.broadcast_excitation * 0.75)
+    assert gathered["dock"] == pytest.approx(BROADCAST_EXCITATION * 0.75)
 
 
 def test_a_behaviour_excites_those_whose_missing_context_it_brings_about() -> None:
     drive = _silent("drive", 0.8, adding={"at charger": 0.0})
     dock = lacking("dock", "at charger", "hungry")
 
-    gathered = _gathered(BehaviourNet(CONFIG), drive, dock)
+    gathered = _gathered(BehaviourNet(), drive, dock)
 
-    assert gathered["dock"] == pytest.approx(CONFIG.successor_excitation * 0.8 / 2)
+    assert gathered["dock"] == pytest.approx(SUCCESSOR_EXCITATION * 0.8 / 2)
 
 
 def test_a_wanted_behaviour_excites_those_that_bring_its_context_about() -> None:
@@ -42,14 +47,14 @@ def test_a_wanted_behaviour_excites_those_that_bring_its_context_about() -> None
     drive = _silent("drive", 0.3, adding={"at charger": 0.0})
     idle = _silent("idle", 0.3)
 
-    gathered = _gathered(BehaviourNet(CONFIG), drive, idle, dock)
+    gathered = _gathered(BehaviourNet(), drive, idle, dock)
 
-    assert gathered["drive"] == pytest.approx(CONFIG.predecessor_excitation * 0.6)
+    assert gathered["drive"] == pytest.approx(PREDECESSOR_EXCITATION * 0.6)
     assert gathered["idle"] == 0.0
 
 
 def test_so_a_behaviour_is_preferred_that_leads_to_a_wanted_one() -> None:
-    net = BehaviourNet(CONFIG)
+    net = BehaviourNet()
     dock = lacking("dock", "at charger", adding={"sated": 0.9})
     drive = _silent("drive", 0.5, adding={"at charger": 0.0})
     wander = _silent("wander", 0.52)
@@ -63,38 +68,37 @@ def test_a_behaviour_inhibits_those_that_undo_its_context() -> None:
     rest = behaviour("rest", 0.5, context={"stands": 0.5})
     drive = _silent("drive", 0.9, deleting=["stands"])
 
-    gathered = _gathered(BehaviourNet(CONFIG), rest, drive)
+    gathered = _gathered(BehaviourNet(), rest, drive)
 
-    assert gathered["drive"] == pytest.approx(-CONFIG.conflictor_inhibition * 0.5)
+    assert gathered["drive"] == pytest.approx(-CONFLICTOR_INHIBITION * 0.5)
 
 
 def test_of_two_that_undo_each_others_context_the_more_active_inhibits() -> None:
-    config = Config(broadcast_excitation=0.0)
     rest = behaviour("rest", 0.5, context={"stands": 0.5}, deleting=["moves"])
     drive = behaviour("drive", 0.9, context={"moves": 0.9}, deleting=["stands"])
 
-    gathered = _gathered(BehaviourNet(config), rest, drive)
+    gathered = _gathered(BehaviourNet(), rest, drive)
 
     assert gathered == {
-        "rest": pytest.approx(-config.conflictor_inhibition * 0.9),
-        "drive": 0.0,
+        "rest": pytest.approx(BROADCAST_EXCITATION * 0.5 - CONFLICTOR_INHIBITION * 0.9),
+        "drive": pytest.approx(BROADCAST_EXCITATION * 0.9),
     }
 
 
 def test_what_was_gathered_decays_and_is_lost_where_the_behaviour_is_chosen() -> None:
-    net = BehaviourNet(Config(net_decay=0.01))
+    net = BehaviourNet()
     dock = behaviour("dock")
-    first = _gathered(net, dock)["dock"]
-    second = _gathered(net, dock)["dock"]
+    net.restore([msgspec.structs.replace(dock, gathered=0.4, rejection=Rejection.LESS_ACTIVE)])
+    left = _gathered(net, dock)["dock"]
     net.on_chosen(dock)
 
-    assert second == pytest.approx(2 * first - 0.01)
-    assert _gathered(net, dock)["dock"] == pytest.approx(first)
+    assert left == pytest.approx(0.4 - DECAY + BROADCAST_EXCITATION)
+    assert _gathered(net, dock)["dock"] == pytest.approx(BROADCAST_EXCITATION)
 
 
 def test_a_behaviour_with_other_nodes_gathers_anew() -> None:
-    net = BehaviourNet(Config(net_decay=0.0))
+    net = BehaviourNet()
     first = _gathered(net, behaviour("dock", bindings={"target": "object:a"}))["dock"]
     other = _gathered(net, behaviour("dock", bindings={"target": "object:b"}))["dock"]
 
-    assert first == other == CONFIG.broadcast_excitation
+    assert first == other == BROADCAST_EXCITATION

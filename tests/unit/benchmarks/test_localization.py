@@ -14,7 +14,9 @@ from benchmarks.localization.loop import LOCALIZATION, LocalizationLoop
 from benchmarks.localization.senses import moments
 from benchmarks.trajectory import trajectory_error_m
 from cogmap.data.mrclam import Robot
+from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
+from cogmap.schemas.graph import Delta, Phase
 
 LANDMARKS = {6: (0.0, 4.0), 7: (5.0, 5.0), 8: (6.0, -1.0), 9: (-2.0, -2.0), 10: (2.0, 1.5)}
 RATE_HZ = 10
@@ -153,6 +155,24 @@ def test_the_workers_time_for_each_task_is_known(robot: Robot) -> None:
     loop.close()
     assert names.count(LOCALIZATION) == 20
     assert "object_place" in names
+
+
+def test_an_answer_that_is_late_is_counted_and_any_other_ends_the_run(robot: Robot) -> None:
+    loop = LocalizationLoop(START)
+    first, second, *_ = moments(robot)
+    loop.live(first)
+
+    loop.count_rejected(rejecting("proposal 1/correct is late: map:1 has changed since 4"))
+    loop.live(second)
+    assert loop.late_answers == 1
+
+    loop.count_rejected(rejecting("proposal 1/correct failed: out of memory"))
+    with pytest.raises(CogmapError, match="out of memory"):
+        loop.live(second)
+
+
+def rejecting(reason: str) -> Delta:
+    return Delta(version=1, cycle=1, phase=Phase.END, operations=[], rejected=1, reasons=[reason])
 
 
 def test_a_trajectory_error_depends_on_its_scale_but_not_on_its_frame() -> None:

@@ -108,6 +108,19 @@ def test_a_file_of_another_kind_or_a_path_with_a_gap_is_refused(tmp_path: Path) 
         read_graph(gap)
 
 
+@pytest.mark.parametrize("loop", ["", "EDGE_SE2 0 2 2 0 0 100 0 0 100 0 100\n"])
+def test_a_chain_and_an_exact_loop_have_a_cost_ratio_of_1(tmp_path: Path, loop: str) -> None:
+    pytest.importorskip("gtsam")
+    path = tmp_path / "chain.g2o"
+    poses = "".join(f"VERTEX_SE2 {number} {number} 0 0\n" for number in range(3))
+    steps = "".join(f"EDGE_SE2 {i} {i + 1} 1 0 0 100 0 0 100 0 100\n" for i in range(2))
+    path.write_text(poses + steps + loop)
+    metrics = measure(_setting(tmp_path), graph_path=path)
+
+    assert metrics["positions_cost_ratio"] == pytest.approx(1.0)
+    assert metrics["cost_vs_gtsam"] == pytest.approx(1.0)
+
+
 def test_without_evo_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "evo.core.geometry", None)
     positions_m = np.zeros((3, 2))

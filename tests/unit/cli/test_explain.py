@@ -10,7 +10,7 @@ import pytest
 from click import UsageError as ClickUsageError
 from click.testing import CliRunner
 
-from cogmap.cli.launch.plan import LOG_NAME
+from cogmap.cli.files import LOG_NAME
 from cogmap.cli.main import cogmap
 from cogmap.errors import LogError, UsageError
 from tests.support.cycles import Cycles

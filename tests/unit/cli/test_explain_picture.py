@@ -12,13 +12,13 @@ from click.testing import CliRunner
 from msgspec import structs
 
 from cogmap.cli.explain import choice
+from cogmap.cli.explain.drawing import deciding, lettering, sensing
+from cogmap.cli.explain.drawing.blocks import Bar, Words
+from cogmap.cli.explain.drawing.box import MOST, Box, inner_in
+from cogmap.cli.explain.drawing.figure import figure
+from cogmap.cli.explain.drawing.robot import Robot
 from cogmap.cli.explain.moment import Moment, moment
 from cogmap.cli.main import cogmap
-from cogmap.cli.plots.moment import deciding, lettering, sensing
-from cogmap.cli.plots.moment.blocks import Bar, Words
-from cogmap.cli.plots.moment.box import MOST, Box, inner_in
-from cogmap.cli.plots.moment.figure import figure
-from cogmap.cli.plots.moment.robot import Robot
 from cogmap.cli.plots.palette import ESTIMATE, PLAN
 from cogmap.errors import LogError
 from cogmap.recording.log import open_log

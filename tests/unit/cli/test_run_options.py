@@ -7,7 +7,8 @@ import pytest
 
 from cogmap.cli.launch.plan import Choices
 from cogmap.cli.options import FiniteRange
-from cogmap.cli.run.command import LAP_LIMIT_S, default_limit_s
+from cogmap.cli.run.execution import default_limit_s
+from cogmap.cli.run.options import LAP_LIMIT_S
 from cogmap.schemas.nodes import Goal
 
 

@@ -9,7 +9,6 @@ import pytest
 from cogmap.errors import ConfigError
 from cogmap.runtime.codelet import ENTRY_POINTS
 from cogmap.services.codelets import table
-from cogmap.services.codelets.sections import SECTIONS
 
 
 def _installed(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
@@ -21,7 +20,7 @@ def _installed(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
 def test_our_codelets_are_there_without_any_other_package(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(table, "entry_points", lambda group: [])
 
-    assert table.all_codelets() == table.CODELETS
+    assert table.all_codelets() == table.own_codelets()
 
 
 def test_a_package_that_cannot_be_imported_is_named_with_the_remedy(
@@ -48,6 +47,6 @@ def test_two_codelets_of_one_name_are_refused(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_the_sections_are_those_of_our_codelets() -> None:
-    of_codelets = {codelet.section: codelet.config for codelet in table.CODELETS}
+    configurable = [codelet for codelet in table.own_codelets() if codelet.section]
 
-    assert of_codelets == SECTIONS
+    assert table.own_settings() == {each.section: each.config for each in configurable}

@@ -32,7 +32,7 @@ from cogmap.schemas.nodes import (
 from cogmap.schemas.sensing import PlaceMatch
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.module import build
-from cogmap.services.codelets.table import CODELETS
+from cogmap.services.codelets.table import own_codelets
 from cogmap.testing import agent, graph_of, landmark, of_type, percept, task
 from tests.support.world.scenes import configured, run, thing
 
@@ -174,13 +174,13 @@ def _bytes(proposal: Proposal) -> bytes:
 
 
 def _codelet(name: str) -> Codelet:
-    (codelet,) = [codelet for codelet in CODELETS if codelet.name == name]
+    (codelet,) = [codelet for codelet in own_codelets() if codelet.name == name]
     return codelet
 
 
 def test_every_codelet_is_tried_here() -> None:
     tried = [asked.codelet for asked in _every_task()]
-    known = [codelet.name for codelet in CODELETS]
+    known = [codelet.name for codelet in own_codelets()]
 
     assert tried == known
 

@@ -36,6 +36,18 @@ def test_tours_are_orders_of_the_nodes_of_their_problem(tmp_path: Path) -> None:
     assert [tour.tolist() for tour in drawn.tours] == [[2, 0, 1]]
 
 
+def test_a_tour_passes_two_nodes_at_one_place_one_after_the_other(tmp_path: Path) -> None:
+    tour = TOUR.replace("3,0,3", "3,0,0,3").replace("4,0,0", "4,0,0,0")
+    folder = _folder(tmp_path, HEADER + tour)
+    for path in folder.glob("Graph*.lib"):
+        path.write_text(
+            GRAPH.replace("DIMENSION : 3", "DIMENSION : 4").replace("EOF", "4 0 0\nEOF")
+        )
+
+    (drawn,) = read_folder(folder)
+    assert [tour.tolist() for tour in drawn.tours] == [[2, 0, 3, 1]]
+
+
 def test_packed_tours_are_read_as_they_are(tmp_path: Path) -> None:
     folder = _folder(tmp_path, "")
     (folder / "tours.csv").unlink()

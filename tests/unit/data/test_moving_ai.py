@@ -37,6 +37,23 @@ def test_a_packed_map_is_read_like_a_plain_one(tmp_path: Path) -> None:
     assert read_map(path).tolist() == read_map(_file(tmp_path, MAP)).tolist()
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("height 2\nwidth 3", "width 3\nheight\t2"),
+        ("\n", "\r\n"),
+        ("\n", " \n"),
+        ("TS.\n", "TS."),
+        ("TS.\n", "TS.\n\n\n"),
+        ("type", "\ufefftype"),
+    ],
+)
+def test_a_map_is_read_as_others_write_it(tmp_path: Path, old: str, new: str) -> None:
+    plain = read_map(_file(tmp_path, MAP)).tolist()
+
+    assert read_map(_file(tmp_path, MAP.replace(old, new))).tolist() == plain
+
+
 def test_problems_are_read_with_their_optimal_length(tmp_path: Path) -> None:
     is_passable = read_map(_file(tmp_path, MAP))
     named = LINE.replace("a.map", "old town.map")
@@ -55,8 +72,10 @@ def test_problems_are_read_with_their_optimal_length(tmp_path: Path) -> None:
         ("height 2", "height -2", "line 2: expected height"),
         (".G@", ".G", "line 5: expected 3 cells"),
         ("TS.", "TX.", "line 6: expected 3 cells"),
-        ("TS.\n", "", "ends where it should have row 2 of 2"),
+        ("TS.\n", "", "ends before row 2 of 2"),
         ("height 2", "height 0", "0 cells"),
+        ("height 2\n", "", "has no height or no width"),
+        ("TS.\n", "TS.\n...\n", "line 7: expected the end after 2 rows"),
     ],
 )
 def test_what_is_wrong_in_a_map_is_named(tmp_path: Path, old: str, new: str, expected: str) -> None:

@@ -72,6 +72,79 @@ def test_a_multipolygon_that_is_cut_off_is_left_out(tmp_path: Path) -> None:
     assert [way.id for way in extract.ways] == [7]
 
 
+def test_what_was_deleted_is_not_there(tmp_path: Path) -> None:
+    by_josm = EXTRACT.replace('<way id="7"', '<way id="7" action="delete" visible="true"')
+    on_the_server = EXTRACT.replace('<way id="7"', '<way id="7" visible="false"')
+    modified = EXTRACT.replace('<way id="7"', '<way id="7" action="modify"')
+
+    assert not osm.read(_write(tmp_path / "a.osm", by_josm)).ways
+    assert not osm.read(_write(tmp_path / "b.osm", on_the_server)).ways
+    assert len(osm.read(_write(tmp_path / "c.osm", modified)).ways) == 1
+
+
+def test_of_an_element_that_comes_twice_the_newest_is_there_once(tmp_path: Path) -> None:
+    new = '<way id="7" version="2"><nd ref="1"/><nd ref="2"/><tag k="highway" v="service"/></way>'
+    old = new.replace('version="2"', 'version="1"').replace("service", "track")
+    for number, ways in enumerate((new + old, old + new, new + new)):
+        extract = EXTRACT.replace("</osm>", f"{ways}</osm>")
+        (way,) = osm.read(_write(tmp_path / f"{number}.osm", extract)).ways
+        assert way.tags == {"highway": "service"}
+
+
+def test_a_way_that_leaves_the_extract_is_in_pieces(tmp_path: Path) -> None:
+    extract = osm.read(_write(tmp_path / "a.osm", EXTRACT))
+    way = osm.Way(1, [1, 2, 98, 99, 2, 1, 97, 1])
+
+    assert extract.pieces(way) == [[1, 2], [2, 1]]
+
+
+def test_positions_in_the_ways_are_read_and_missing_ones_named(tmp_path: Path) -> None:
+    geom = """<osm version="0.6"><way id="7"><nd ref="1" lat="48.4" lon="15.6"/>
+      <nd ref="2" lat="48.5" lon="15.7"/><tag k="highway" v="road"/></way></osm>"""
+    body = """<osm version="0.6"><way id="7"><nd ref="1"/><nd ref="2"/></way></osm>"""
+
+    assert osm.read(_write(tmp_path / "a.osm", geom)).nodes == {1: (15.6, 48.4), 2: (15.7, 48.5)}
+    with pytest.raises(UsageError, match=r"no positions of their nodes: give .*`\(\._;>;\); out;`"):
+        osm.read(_write(tmp_path / "b.osm", body))
+
+
+def test_longitudes_go_on_across_the_180th_meridian(tmp_path: Path) -> None:
+    across = EXTRACT.replace("15.6", "179.75").replace("15.7", "-179.75")
+
+    nodes = osm.read(_write(tmp_path / "a.osm", across)).nodes
+    assert nodes == {1: (179.75, 48.4), 2: (180.25, 48.5)}
+
+
+def test_a_download_that_is_not_whole_is_named_with_its_remark(tmp_path: Path) -> None:
+    remark = "<remark> runtime error: Query run out of memory </remark>"
+    path = _write(tmp_path / "a.osm", EXTRACT.replace("</osm>", f"{remark}</osm>"))
+
+    with pytest.raises(UsageError, match=r"not whole.*run out of memory\): ask it for a smaller"):
+        osm.read(path)
+
+
+@pytest.mark.parametrize(
+    ("content", "remedy"),
+    [
+        ('{"version":0.6,"elements":[]}', r"it is JSON, ask Overpass for \[out:xml\]"),
+        (
+            "<html><title>429 Too Many Requests</title></html>",
+            "it is a web page .* again",
+        ),
+    ],
+)
+def test_a_download_of_another_kind_is_named(tmp_path: Path, content: str, remedy: str) -> None:
+    with pytest.raises(UsageError, match=f"cannot be read .*: {remedy}"):
+        osm.read(_write(tmp_path / "a.osm", content))
+
+
+def test_a_packed_extract_is_known_by_its_content(tmp_path: Path) -> None:
+    path = tmp_path / "a.osm"
+    path.write_bytes(gzip.compress(EXTRACT.encode()))
+
+    assert len(osm.read(path).nodes) == 2
+
+
 @pytest.mark.parametrize(
     ("suffix", "opener"), [(".xz", lzma.open), (".gz", gzip.open), (".bz2", bz2.open)]
 )
@@ -148,7 +221,9 @@ def test_what_is_no_extract_is_one_sentence(
     if content is not None:
         path.write_bytes(content)
 
-    with pytest.raises(UsageError, match=r"cannot be read .*: give an OpenStreetMap extract"):
+    with pytest.raises(
+        UsageError, match=r"(cannot be read|there is no file) .*: give an OpenStreetMap"
+    ):
         osm.read(path)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import bz2
+import gzip
+import logging
 import lzma
 from pathlib import Path
 
@@ -56,11 +59,40 @@ def test_a_problem_is_read_with_its_lengths_rounded_to_the_nearest(tmp_path: Pat
     assert np.array_equal(problem.lengths, problem.lengths.T)
 
 
-def test_a_packed_problem_is_read_as_it_is(tmp_path: Path) -> None:
-    path = tmp_path / "square.tsp.xz"
-    path.write_bytes(lzma.compress(SQUARE.encode()))
+@pytest.mark.parametrize(
+    ("suffix", "packed"), [(".xz", lzma.compress), (".gz", gzip.compress), (".bz2", bz2.compress)]
+)
+def test_a_packed_problem_and_its_tour_are_found(tmp_path: Path, suffix: str, packed) -> None:
+    (tmp_path / f"square.tsp{suffix}").write_bytes(packed(SQUARE.encode()))
+    (tmp_path / f"square.opt.tour{suffix}").write_bytes(packed(TOUR.encode()))
+    (problem,) = tsplib.folder(tmp_path).problems
 
-    assert len(tsplib.read(path)) == 4
+    assert len(problem) == 4
+    assert tsplib.optimal_tour(tmp_path, problem) is not None
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("NODE_COORD_SECTION", "NODE_COORD_SECTION:"),
+        ("NODE_COORD_SECTION", "node_coord_section"),
+        (" : ", ":"),
+        (" : ", " "),
+        ("four corners", "a: b, best length: 12"),
+        ("four corners", "coins carr\xe9s"),
+        ("EUC_2D\n", "EUC_2D (rounded)\nDISPLAY_DATA_TYPE : COORD_DISPLAY\n"),
+        ("\n", "\r\n"),
+        ("NAME", "\xef\xbb\xbfNAME"),
+        ("EOF", "-1\nEOF"),
+        ("EOF\n", ""),
+    ],
+)
+def test_headers_are_read_as_others_write_them(tmp_path: Path, old: str, new: str) -> None:
+    plain = tsplib.read(_file(tmp_path, SQUARE))
+    path = tmp_path / "other.tsp"
+    path.write_bytes(SQUARE.replace(old, new).encode("latin-1"))
+
+    assert np.array_equal(tsplib.read(path).positions, plain.positions)
 
 
 def test_pseudo_euclidean_lengths_are_rounded_up() -> None:
@@ -98,6 +130,21 @@ def test_the_optimal_tour_of_a_problem_lies_beside_it(tmp_path: Path) -> None:
     assert tour.tolist() == [0, 3, 2, 1]
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("1\n4\n3\n2\n-1\n", "1 4 3 2 -1\n"),
+        ("-1\n", ""),
+        ("DIMENSION : 4\n", ""),
+        ("TOUR_SECTION", "TOUR_SECTION :"),
+    ],
+)
+def test_tours_are_read_as_others_write_them(tmp_path: Path, old: str, new: str) -> None:
+    path = _file(tmp_path, TOUR.replace(old, new), "square.opt.tour")
+
+    assert tsplib.read_tour(path).tolist() == [0, 3, 2, 1]
+
+
 def test_an_optimal_tour_of_another_problem_is_refused(tmp_path: Path) -> None:
     problem = tsplib.read(_file(tmp_path, SQUARE))
     shorter = TOUR.replace("DIMENSION : 4", "DIMENSION : 3").replace("\n4\n", "\n")
@@ -116,7 +163,7 @@ def test_an_optimal_tour_of_another_problem_is_refused(tmp_path: Path) -> None:
         ("2 0.0 10.4", "2 0.0 nan", "line 8: expected 2 and two coordinates"),
         ("2 0.0 10.4", "2 0.0", "line 8: expected 2 and two coordinates"),
         ("2 0.0 10.4", "7 0.0 10.4", "line 8: expected 2 and two coordinates"),
-        ("TYPE : TSP", "TYPE = TSP", "line 3: expected KEY : VALUE"),
+        ("TYPE : TSP", "A = TSP", "line 3: expected KEY : VALUE"),
         ("DIMENSION : 4\n", "", "has no line DIMENSION"),
         ("NODE_COORD_SECTION", "SECTION : 1", "line 7: expected KEY : VALUE"),
     ],
@@ -146,6 +193,22 @@ def test_a_wrong_tour_is_named_by_what_was_expected(
 
     with pytest.raises(UsageError, match=expected):
         tsplib.read_tour(path)
+
+
+@pytest.mark.parametrize(("before", "after"), [("FIXED_EDGES_SECTION\n1 2\n-1\n", ""), ("", "1")])
+def test_a_problem_with_another_section_is_left_out_with_a_warning(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, before: str, after: str
+) -> None:
+    _file(tmp_path, SQUARE, "a.tsp")
+    fixed = "FIXED_EDGES_SECTION\n1 2\n-1\n"
+    other = SQUARE.replace("NODE_COORD", f"{before}NODE_COORD")
+    _file(tmp_path, other.replace("EOF", f"{fixed}EOF") if after else other, "b.tsp")
+    with caplog.at_level(logging.WARNING, "cogmap"):
+        found = tsplib.folder(tmp_path)
+
+    assert [problem.name for problem in found.problems] == ["a"]
+    assert "left out: " in caplog.text
+    assert "got 'FIXED_EDGES_SECTION': such problems are not read" in caplog.text
 
 
 def test_a_folder_is_read_by_name_and_what_is_left_out_is_named(tmp_path: Path) -> None:

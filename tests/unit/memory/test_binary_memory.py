@@ -10,8 +10,8 @@ from cogmap.geometry.arrays import Bytes
 from cogmap.services.memory.sparse import binary
 from cogmap.services.memory.sparse.build import build
 from cogmap.services.memory.sparse.config import SparseConfig
-from cogmap.services.memory.sparse.interface import AssociativeMemory
-from cogmap.services.memory.sparse.memory import SparseMemory
+from cogmap.services.memory.sparse.interface import MAX_READS, AssociativeMemory
+from cogmap.services.memory.sparse.modular import ModularMemory
 from cogmap.services.memory.sparse.vectors import distance, random_vectors
 
 
@@ -28,14 +28,14 @@ def test_the_parameters_are_lidas() -> None:
     config = SparseConfig()
     parameters = (binary.DIMENSIONS, binary.ACCESS_RADIUS, binary.COUNTER_LIMIT)
 
-    assert (config.hard_locations, config.max_reads) == (10_000, 19)
+    assert (config.hard_locations, MAX_READS) == (10_000, 19)
     assert parameters == (1000, 451, 40)
 
 
 def test_the_kind_of_memory_is_the_one_that_is_configured(memory: AssociativeMemory) -> None:
     modular = build(SparseConfig(hard_locations=1000))
 
-    assert isinstance(modular, SparseMemory)
+    assert isinstance(modular, ModularMemory)
     assert (modular.dimensions, modular.values) == (1024, 16)
     assert (memory.dimensions, memory.values) == (1000, 2)
 

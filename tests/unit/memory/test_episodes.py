@@ -11,9 +11,7 @@ from cogmap.services.memory.episodic.config import EpisodicConfig
 from cogmap.services.memory.episodic.episodes import HOUR_NS, Episodes
 
 BAKERY = Remembered(kind="object", label="bakery")
-CONFIG = EpisodicConfig(
-    decay_per_h=0.1, consolidation_h=1.0, consolidation_threshold=0.6, max_declarative=2
-)
+CONFIG = EpisodicConfig(decay_per_h=0.1, consolidation_h=1.0, max_declarative=2)
 
 
 def transient(number: int = 1, activation: float = 0.8, run: int = 1) -> TransientEpisode:

@@ -12,7 +12,6 @@ from cogmap.schemas.nodes import Remembered
 from cogmap.services.memory.episodic.cues import MAX_LEARNED, EpisodicCues, Found
 from cogmap.services.memory.sparse.config import SparseConfig
 
-PLACE_M = 10.0
 SMALL = SparseConfig(hard_locations=2000, dimensions=512)
 LOOKS = [f"look {number}" for number in range(20)]
 PATH = ((5.0, 5.0), (-5.0, 5.0))
@@ -44,7 +43,7 @@ def episode(
 
 def match(cue: TransientEpisode, stored: TransientEpisode | None = None) -> float:
     """How well a cue matches the one episode that is stored; 0 where it recalls none."""
-    cues = EpisodicCues(SMALL, PLACE_M)
+    cues = EpisodicCues(SMALL)
     cues.hold({1: stored or episode()})
     found = cues.recalled(cue, lambda _: True)
     return 0.0 if found is None else found.match
@@ -99,7 +98,7 @@ def test_the_same_on_another_map_is_unrelated() -> None:
 
 def test_of_many_episodes_that_share_looks_the_right_one_is_recalled() -> None:
     episodes = town(MAX_LEARNED)
-    cues = EpisodicCues(SMALL, PLACE_M)
+    cues = EpisodicCues(SMALL)
     cues.hold(episodes)
 
     right = 0
@@ -113,7 +112,7 @@ def test_of_many_episodes_that_share_looks_the_right_one_is_recalled() -> None:
 
 
 def test_what_is_not_held_any_more_or_not_wanted_is_not_recalled() -> None:
-    cues = EpisodicCues(SMALL, PLACE_M)
+    cues = EpisodicCues(SMALL)
     cues.hold({1: episode(1), 2: episode(2, (100.0, 50.0))})
     assert cues.recalled(episode(), lambda number: number != 1) is None
 
@@ -124,7 +123,7 @@ def test_what_is_not_held_any_more_or_not_wanted_is_not_recalled() -> None:
 
 def test_many_restored_episodes_are_learned_in_several_steps() -> None:
     episodes = town(MAX_LEARNED + 1)
-    cues = EpisodicCues(SMALL, PLACE_M)
+    cues = EpisodicCues(SMALL)
     last = episodes[MAX_LEARNED + 1]
 
     cues.hold(episodes)
@@ -136,4 +135,4 @@ def test_many_restored_episodes_are_learned_in_several_steps() -> None:
 
 
 def test_an_empty_memory_recalls_nothing() -> None:
-    assert EpisodicCues(SMALL, PLACE_M).recalled(episode(), lambda _: True) is None
+    assert EpisodicCues(SMALL).recalled(episode(), lambda _: True) is None

@@ -18,12 +18,10 @@ from cogmap.schemas.nodes import (
     object_id,
     segment_id,
 )
-from cogmap.services.memory.config import Config
 from cogmap.services.memory.maps import RememberedMap
 from cogmap.services.memory.passing import Way, way_of
 from cogmap.services.memory.recall import Recalled, recalled
 
-CONFIG = Config()
 POSE = np.array([30.0, -10.0, 0.7])
 STREET_M = np.column_stack([np.arange(0.0, 100.0), np.zeros(100)])
 HOUSES_M = np.array([8.0, 17.0, 31.0, 38.0, 52.0, 63.0, 74.0, 88.0])
@@ -69,7 +67,7 @@ def seen_from(pose: Floats, nodes: list[Object]) -> list[Object]:
 def recall(nodes: list[Object], stored: RememberedMap, way_m: Floats) -> Recalled | None:
     """What is recalled on a way along these, in a frame of its own."""
     here = seen_from(POSE, nodes)
-    return recalled(here, Way(transform_to(POSE, way_m), here), [stored], 1.0, CONFIG)
+    return recalled(here, Way(transform_to(POSE, way_m), here), [stored], 1.0)
 
 
 def test_a_street_of_two_looks_is_recalled_once_it_was_driven() -> None:

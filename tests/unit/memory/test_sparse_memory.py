@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-import msgspec
 import numpy as np
 import pytest
 
 from benchmarks.memory.recall import corrupted
 from benchmarks.memory.speed import NumpyLoop
 from cogmap.geometry.arrays import Bytes
-from cogmap.services.memory.sparse.build import build
 from cogmap.services.memory.sparse.config import SparseConfig
-from cogmap.services.memory.sparse.memory import (
+from cogmap.services.memory.sparse.interface import iterated_read
+from cogmap.services.memory.sparse.modular import (
     COUNTER_LIMIT,
-    SparseMemory,
+    ModularMemory,
     access_radius,
     hard_addresses,
 )
@@ -27,15 +26,15 @@ from cogmap.services.memory.sparse.vectors import (
     random_vectors,
 )
 
-CONFIG = SparseConfig(hard_locations=2000, dimensions=512, activated_share=0.07, seed=3)
+CONFIG = SparseConfig(hard_locations=2000, dimensions=512, seed=3)
 
 
 def _vectors(count: int) -> Bytes:
     return random_vectors(np.random.default_rng(1), count, CONFIG.dimensions)
 
 
-def _memory_of(vectors: Bytes, rounds: int = 1) -> SparseMemory:
-    memory = SparseMemory(CONFIG)
+def _memory_of(vectors: Bytes, rounds: int = 1) -> ModularMemory:
+    memory = ModularMemory(CONFIG)
     for _ in range(rounds):
         for vector in vectors:
             memory.write(vector, vector)
@@ -49,7 +48,7 @@ def _cue(vector: Bytes, share: float = 0.3) -> Bytes:
 def test_an_empty_memory_recalls_nothing() -> None:
     (cue,) = _vectors(1)
 
-    assert SparseMemory(CONFIG).read(cue) is None
+    assert ModularMemory(CONFIG).read(cue) is None
 
 
 def test_a_cue_activates_the_share_of_locations_that_is_configured() -> None:
@@ -85,13 +84,11 @@ def test_an_iterated_read_comes_nearer_than_a_single_one() -> None:
     assert distance(recall.vector, vectors[0]) < distance(once, vectors[0])
 
 
-def test_an_iterated_read_ends_after_the_reads_that_are_configured() -> None:
+def test_an_iterated_read_ends_after_the_reads_that_are_allowed() -> None:
     vectors = _vectors(100)
-    memory = build(msgspec.structs.replace(CONFIG, max_reads=2))
-    for vector in vectors:
-        memory.write(vector, vector)
+    memory = _memory_of(vectors)
 
-    recall = memory.read(_cue(vectors[0]))
+    recall = iterated_read(memory.read_once, _cue(vectors[0]), max_reads=2)
 
     assert recall is not None
     assert (recall.converged, recall.reads) == (False, 2)
@@ -120,7 +117,7 @@ def test_a_vector_that_is_written_a_hundred_times_does_not_drown_the_others() ->
 
 def test_what_is_written_at_the_same_address_replaces_what_was() -> None:
     address, before, after = _vectors(3)
-    memory = SparseMemory(CONFIG)
+    memory = ModularMemory(CONFIG)
     memory.write(address, before)
     memory.write(address, after)
 
@@ -132,7 +129,7 @@ def test_what_is_written_at_the_same_address_replaces_what_was() -> None:
 
 def test_a_sequence_is_followed_from_each_vector_to_the_next() -> None:
     vectors = _vectors(20)
-    memory = SparseMemory(CONFIG)
+    memory = ModularMemory(CONFIG)
     for vector, following in pairwise(vectors):
         memory.write(vector, following)
 
@@ -146,7 +143,7 @@ def test_a_sequence_is_followed_from_each_vector_to_the_next() -> None:
 
 def test_counters_stop_at_their_limit() -> None:
     (vector,) = _vectors(1)
-    memory = SparseMemory(CONFIG)
+    memory = ModularMemory(CONFIG)
     memory.counters[:] = COUNTER_LIMIT
     memory.write(vector, vector)
 

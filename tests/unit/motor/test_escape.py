@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from cogmap.schemas.sensing import MotorCommand, SpeedLimit
-from cogmap.services.motor.config import Config
 from cogmap.services.motor.motor import halted
-from cogmap.services.motor.reactive.escape import BACK_S, PATIENCE_S, Escape
+from cogmap.services.motor.reactive.escape import BACK_S, HALTED_S, Escape
 
 
 def _forward(seconds: float) -> MotorCommand:
@@ -25,13 +24,13 @@ def _backs(command: MotorCommand) -> bool:
 
 
 def test_a_robot_that_moves_is_left_alone() -> None:
-    escape = Escape(Config())
+    escape = Escape()
 
     assert escape.command(_forward(1.0), is_stuck=False) == _forward(1.0)
 
 
 def test_a_stuck_robot_backs_away_for_a_while() -> None:
-    escape = Escape(Config())
+    escape = Escape()
     first = escape.command(_forward(1.0), is_stuck=True)
     last = escape.command(_forward(1.0 + 0.9 * BACK_S), is_stuck=False)
     after = escape.command(_forward(1.0 + BACK_S), is_stuck=False)
@@ -41,9 +40,9 @@ def test_a_stuck_robot_backs_away_for_a_while() -> None:
 
 
 def test_before_an_obstacle_it_waits_before_it_backs_away() -> None:
-    escape = Escape(Config())
+    escape = Escape()
     first = escape.command(_before_obstacle(1.0), is_stuck=False)
-    later = escape.command(_before_obstacle(1.0 + PATIENCE_S), is_stuck=False)
+    later = escape.command(_before_obstacle(1.0 + HALTED_S), is_stuck=False)
 
     assert first.halted_by is SpeedLimit.OBSTACLE
     assert _backs(later)
@@ -51,8 +50,8 @@ def test_before_an_obstacle_it_waits_before_it_backs_away() -> None:
 
 
 def test_an_obstacle_that_goes_away_is_forgotten() -> None:
-    escape = Escape(Config())
+    escape = Escape()
     escape.command(_before_obstacle(1.0), is_stuck=False)
     escape.command(_forward(1.2), is_stuck=False)
 
-    assert not _backs(escape.command(_before_obstacle(1.0 + PATIENCE_S), is_stuck=False))
+    assert not _backs(escape.command(_before_obstacle(1.0 + HALTED_S), is_stuck=False))

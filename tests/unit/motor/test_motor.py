@@ -9,16 +9,25 @@ import numpy as np
 import pytest
 
 from cogmap.errors import MessageError
+from cogmap.robot import CLEARANCE_M, HALF_WIDTH_M, TRACK_M, WHEEL_RADIUS_M
 from cogmap.schemas.array import Array
-from cogmap.schemas.sensing import MotorCommand, Pose, SpeedLimit
+from cogmap.schemas.sensing import MotorCommand, Pose, RangeScan, SpeedLimit
 from cogmap.services.motor.aim import Aim
 from cogmap.services.motor.config import Config
 from cogmap.services.motor.motor import SensoryMotorMemory, obstacle_ahead_m
 from cogmap.services.motor.programs import FollowPlan
 from cogmap.services.motor.reactive.near import NearObstacles
-from cogmap.services.motor.route import SMOOTHED_M
-from cogmap.testing import range_scan
+from cogmap.services.motor.route import LOOKAHEAD_M, SMOOTHED_M
 from tests.support.world.plans import Point, plan_along
+
+
+def _scan(*obstacles: tuple[float, float]) -> RangeScan:
+    bearing_rad, range_m = np.array(obstacles, np.float32).reshape(-1, 2).T
+    return RangeScan(
+        frame=1,
+        bearing_rad=Array.of(bearing_rad),
+        range_m=Array.of(range_m),
+    )
 
 
 def _command(
@@ -36,7 +45,7 @@ def _command(
     aim = program.aim(pose)
     assert isinstance(aim, Aim)
 
-    motor = SensoryMotorMemory(config, NearObstacles(config.half_width_m))
+    motor = SensoryMotorMemory(config, NearObstacles(HALF_WIDTH_M))
     return motor.command(7, aim, clear_m, round(age_s * 1e9))
 
 
@@ -49,9 +58,7 @@ def test_on_the_line_and_along_it_both_wheels_turn_at_cruising_speed() -> None:
     config = Config()
 
     assert (
-        command.left_wheel_rad_s
-        == command.right_wheel_rad_s
-        == config.cruise_m_s / config.wheel_radius_m
+        command.left_wheel_rad_s == command.right_wheel_rad_s == config.cruise_m_s / WHEEL_RADIUS_M
     )
     assert (command.halted_by, command.stamp_ns) == ("", 7)
 
@@ -87,20 +94,13 @@ def test_before_an_obstacle_the_robot_turns_to_where_the_route_leads() -> None:
 
 
 def test_the_arc_of_pure_pursuit_passes_through_the_point_ahead() -> None:
-    config = Config()
     command = _command(_at(10.0, 1.0))
-    speed_m_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * config.wheel_radius_m
-    turn_rad_s = (
-        (command.right_wheel_rad_s - command.left_wheel_rad_s)
-        * config.wheel_radius_m
-        / config.track_m
-    )
+    speed_m_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2 * WHEEL_RADIUS_M
+    turn_rad_s = (command.right_wheel_rad_s - command.left_wheel_rad_s) * WHEEL_RADIUS_M / TRACK_M
     radius_m = speed_m_s / turn_rad_s
     centre = (10.0, 1.0 + radius_m)
 
-    assert math.dist(centre, (10.0 + config.lookahead_m, 0.0)) == pytest.approx(
-        abs(radius_m), rel=1e-6
-    )
+    assert math.dist(centre, (10.0 + LOOKAHEAD_M, 0.0)) == pytest.approx(abs(radius_m), rel=1e-6)
 
 
 def test_the_robot_slows_down_before_a_bend() -> None:
@@ -117,7 +117,7 @@ def test_the_robot_slows_down_on_an_arc_that_leads_it_back_to_a_straight_route()
     config = Config()
     command = _command(_at(10.0, 1.0))
     sides_rad_s = command.right_wheel_rad_s - command.left_wheel_rad_s
-    turn_rad_s = abs(sides_rad_s) * config.wheel_radius_m / config.track_m
+    turn_rad_s = abs(sides_rad_s) * WHEEL_RADIUS_M / TRACK_M
 
     assert command.slowed_by == SpeedLimit.BEND
     assert _driven(command) * turn_rad_s == pytest.approx(config.lateral_m_s2)
@@ -126,11 +126,11 @@ def test_the_robot_slows_down_on_an_arc_that_leads_it_back_to_a_straight_route()
 def _driven(command: MotorCommand) -> float:
     """The speed of the robot by a command, in m/s."""
     mean_rad_s = (command.left_wheel_rad_s + command.right_wheel_rad_s) / 2
-    return mean_rad_s * Config().wheel_radius_m
+    return mean_rad_s * WHEEL_RADIUS_M
 
 
 def test_the_robot_slows_down_before_an_obstacle_and_stops_at_its_clearance() -> None:
-    clearance_m = Config().clearance_m
+    clearance_m = CLEARANCE_M
     clear_m = [clearance_m + free_m for free_m in (18.0, 2.5, 0.5)]
     speeds = [_driven(_command(_at(5.0), each_m)) for each_m in clear_m]
 
@@ -172,9 +172,9 @@ def test_a_pose_older_than_the_limit_halts_the_robot() -> None:
 
 
 def test_the_second_nearest_point_ahead_is_the_obstacle() -> None:
-    ahead = range_scan((0.0, 8.0), (0.05, 8.2))
+    ahead = _scan((0.0, 8.0), (0.05, 8.2))
 
-    assert obstacle_ahead_m(ahead, 0.7) == pytest.approx(8.2, abs=0.05)
+    assert obstacle_ahead_m(ahead) == pytest.approx(8.2, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -190,12 +190,12 @@ def test_the_second_nearest_point_ahead_is_the_obstacle() -> None:
 def test_what_stands_aside_behind_or_alone_is_no_obstacle(
     points: list[tuple[float, float]],
 ) -> None:
-    assert obstacle_ahead_m(range_scan(*points), 0.7) == math.inf
+    assert obstacle_ahead_m(_scan(*points)) == math.inf
 
 
 def test_a_scan_whose_bearings_and_ranges_do_not_pair_is_refused() -> None:
     three_ranges = Array.of(np.ones(3, np.float32))
-    scan = msgspec.structs.replace(range_scan((0.0, 8.0), (0.1, 8.0)), range_m=three_ranges)
+    scan = msgspec.structs.replace(_scan((0.0, 8.0), (0.1, 8.0)), range_m=three_ranges)
 
     with pytest.raises(MessageError, match="2,\\) bearings and \\(3"):
-        obstacle_ahead_m(scan, 0.7)
+        obstacle_ahead_m(scan)

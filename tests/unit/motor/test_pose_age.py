@@ -7,6 +7,7 @@ from collections import deque
 
 import pytest
 
+from cogmap.robot import TRACK_M, WHEEL_RADIUS_M
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
@@ -44,7 +45,7 @@ class SlowMachine:
 
     def on_command(self, command: MotorCommand) -> None:
         """Obey the newest command."""
-        radius_m = Config().wheel_radius_m
+        radius_m = WHEEL_RADIUS_M
         self.commands.append(command)
         self._wheels_m_s = (
             command.left_wheel_rad_s * radius_m,
@@ -69,7 +70,7 @@ class SlowMachine:
         x_m, y_m, heading_rad = self._pose
         left, right = self._wheels_m_s
         step_m = (left + right) / 2 * TICK_S
-        turn_rad = (right - left) / Config().track_m * TICK_S
+        turn_rad = (right - left) / TRACK_M * TICK_S
         middle_rad = heading_rad + turn_rad / 2
         x_m += step_m * math.cos(middle_rad)
         y_m += step_m * math.sin(middle_rad)

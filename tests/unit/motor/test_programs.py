@@ -7,6 +7,7 @@ import math
 import pytest
 
 from cogmap.errors import MessageError
+from cogmap.robot import WHEEL_RADIUS_M
 from cogmap.runtime.module import Module
 from cogmap.schemas.base import Scalar
 from cogmap.schemas.cognition import PARAMETERS, ActionName, MotorProgram
@@ -15,8 +16,14 @@ from cogmap.schemas.sensing import Pose, SpeedLimit
 from cogmap.services.motor.aim import Aim
 from cogmap.services.motor.config import Config
 from cogmap.services.motor.guide import Track
-from cogmap.services.motor.programs import FollowPlan, Program, program_of
-from cogmap.services.motor.seeking import sought_by
+from cogmap.services.motor.programs import (
+    DOCK_M_S,
+    DOCKED_M,
+    FollowPlan,
+    Program,
+    program_of,
+    sought_by,
+)
 from tests.support.world.motor import action_of, command_after, module_ahead, pose_delta, scan_of
 from tests.support.world.plans import plan_along
 
@@ -70,13 +77,12 @@ def test_a_robot_that_turns_moves_its_wheels_against_each_other_also_before_an_o
 
 
 def test_a_robot_docks_slowly_and_stays_where_it_has_docked() -> None:
-    config = Config()
     dock = _program(ActionName.DOCK, x_m=10.0, y_m=0.0)
     first = dock.aim(_at())
-    last = [dock.aim(_at(x_m)) for x_m in (10.0 - config.docked_m / 2, 11.0)]
+    last = [dock.aim(_at(x_m)) for x_m in (10.0 - DOCKED_M / 2, 11.0)]
 
     assert isinstance(first, Aim)
-    assert first.speed.m_s == config.dock_m_s
+    assert first.speed.m_s == DOCK_M_S
     assert (first.bearing_rad, first.distance_m) == (0.0, 10.0)
     assert last == [SpeedLimit.NO_ACTION, SpeedLimit.NO_ACTION]
 
@@ -87,7 +93,7 @@ def test_an_obstacle_stops_a_robot_that_docks() -> None:
     module.feed(scan_of((0.0, 1.2), (0.05, 1.2)))
     blocked = command_after(module, pose_delta(2))
 
-    assert free.left_wheel_rad_s == pytest.approx(Config().dock_m_s / Config().wheel_radius_m)
+    assert free.left_wheel_rad_s == pytest.approx(DOCK_M_S / WHEEL_RADIUS_M)
     assert blocked.halted_by is SpeedLimit.OBSTACLE
 
 

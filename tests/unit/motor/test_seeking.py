@@ -8,7 +8,7 @@ from cogmap.errors import MessageError
 from cogmap.schemas.base import Scalar
 from cogmap.schemas.cognition import ActionName, MotorProgram
 from cogmap.schemas.nodes import Goal, goal_id
-from cogmap.services.motor.seeking import sought_by
+from cogmap.services.motor.programs import sought_by
 
 
 def program(action: str, **parameters: Scalar) -> MotorProgram:

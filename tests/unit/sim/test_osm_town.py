@@ -42,11 +42,13 @@ PATH = ("103", (1, 4), {"highway": "footway"})
 Element = tuple[str, tuple[int, ...], dict[str, str]]
 
 
-def _file(folder: Path, *ways: Element, scale: float = 1.0) -> Path:
+def _file(folder: Path, *ways: Element, scale: float = 1.0, lon: float = 0.0) -> Path:
+    """Write an extract around the equator at the longitude `lon`."""
     lines = ['<osm version="0.6">']
     for number, (x_m, y_m) in NODES.items():
-        lon, lat = scale * x_m * METRE_DEG, scale * y_m * METRE_DEG
-        lines.append(f'<node id="{number}" lon="{lon:.9f}" lat="{lat:.9f}"/>')
+        east, lat = lon + scale * x_m * METRE_DEG, scale * y_m * METRE_DEG
+        east = east - 360.0 if east > 180.0 else east
+        lines.append(f'<node id="{number}" lon="{east:.9f}" lat="{lat:.9f}"/>')
 
     for way, nodes, tags in ways:
         lines.append(f'<way id="{way}">')
@@ -93,6 +95,28 @@ def test_a_street_through_a_building_and_one_apart_are_left_out(tmp_path: Path) 
     assert sorted(road.name for road in place.roads) == ["Main Street 2", "service way 1"]
 
 
+def test_a_closed_street_has_all_its_sides(tmp_path: Path) -> None:
+    loop = ("104", (1, 4, 3, 2, 1), {"highway": "residential", "name": "Loop"})
+    place = osm.read(_file(tmp_path, loop, SHOP))
+
+    assert sum(road.length_m for road in place.roads) == pytest.approx(120 + 2 * 78.1, abs=0.5)
+
+
+def test_a_street_that_leaves_the_extract_is_not_bridged(tmp_path: Path) -> None:
+    clipped = ("105", (1, 2, 98, 99, 3, 4), {"highway": "residential", "name": "U Street"})
+    place = osm.read(_file(tmp_path, SIDE, clipped, SHOP))
+
+    assert sorted(place.roads, key=lambda road: road.name)[0].name == "U Street 1"
+    assert (0.0, 60.0) not in {(road.start[0], road.end[0]) for road in place.roads}
+
+
+def test_a_town_across_the_180th_meridian_is_as_large_as_elsewhere(tmp_path: Path) -> None:
+    plain = osm.read(_file(tmp_path, MAIN, SIDE, SHOP))
+    across = osm.read(_file(tmp_path, MAIN, SIDE, SHOP, lon=180.0))
+
+    assert [road.length_m for road in across.roads] == [road.length_m for road in plain.roads]
+
+
 def test_the_robot_starts_on_a_street_clear_of_walls(tmp_path: Path) -> None:
     place = osm.read(_file(tmp_path, MAIN, SIDE, SHOP))
     start = place.start
@@ -127,12 +151,20 @@ def test_an_extract_larger_than_4_km2_is_refused(tmp_path: Path) -> None:
         ({"height": "tall", "building:levels": "2"}, 6.0),
         ({}, 7.0),
         ({"height": "999"}, 120.0),
+        ({"height": "40'"}, 12.19),
+        ({"height": "14'6\""}, 4.42),
+        ({"height": "40 ft"}, 12.19),
+        ({"height": "12 metres"}, 12.0),
+        ({"height": "~12"}, 12.0),
+        ({"building:levels": "2;3"}, 9.0),
+        ({"building:levels": "5+"}, 15.0),
+        ({"height": "10-12"}, 7.0),
     ],
 )
 def test_a_height_is_that_of_the_tag_or_of_the_levels(
     tags: dict[str, str], expected_m: float
 ) -> None:
-    assert height_m(tags) == expected_m
+    assert height_m(tags) == pytest.approx(expected_m, abs=0.005)
 
 
 def test_widths_and_functions_follow_the_tags() -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Phase
-from cogmap.schemas.nodes import NEVER_NS, Object, object_id, percept_id
+from cogmap.schemas.nodes import NEVER_NS, Misfits, Object, object_id, percept_id
 from cogmap.schemas.nodes import Percept as PerceptNode
 from cogmap.schemas.sensing import Percept
 from cogmap.services.workspace.individuals import individuals
@@ -32,7 +32,7 @@ def _labels(
     not_elsewhere_ns: int = NEVER_NS,
 ) -> list[str]:
     """The labels of what an agent at the origin sees, who knows `objects`."""
-    looker = agent(not_elsewhere_ns=not_elsewhere_ns)
+    looker = agent(misfits=Misfits(not_elsewhere_ns=not_elsewhere_ns))
     entered = individuals(percepts(0, *seen), graph_of(looker, *objects), motions)
     return [each.label for each in entered.objects]
 

@@ -10,7 +10,7 @@ from cogmap.runtime.run import REAL_TIME
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.nodes import Self
 from cogmap.schemas.process import Presence
-from cogmap.services.codelets.sub_maps.coarse_places import Config as CoarsePlacesConfig
+from cogmap.services.codelets.sub_maps.coarse_places import EVERY_CYCLES
 from cogmap.testing import (
     PERIOD_NS,
     agent,
@@ -258,7 +258,7 @@ def _missed_deadline() -> tuple[Desk, Task]:
 
 def test_background_work_is_given_out_after_what_the_broadcast_waits_for() -> None:
     desk = Desk("w1")
-    desk.drive(range(CoarsePlacesConfig().every_cycles))
+    desk.drive(range(EVERY_CYCLES))
 
     published = of_type(Task, desk.published)
     background = [task.codelet for task in published].index("coarse_places")
@@ -268,12 +268,12 @@ def test_background_work_is_given_out_after_what_the_broadcast_waits_for() -> No
 
 def test_background_work_begins_in_a_cycle_that_ends_at_its_deadline_too() -> None:
     desk = Desk("w1", run=REAL_TIME, deadline_ms=180.0)
-    every = CoarsePlacesConfig().every_cycles
-    desk.drive(range(every - 1))
+    last = EVERY_CYCLES - 1
+    desk.drive(range(last))
 
-    desk.see(every - 1)
+    desk.see(last)
     assert "coarse_places" not in {task.codelet for task in desk.take()}
-    desk.clock(_after(every - 1, 181))
+    desk.clock(_after(last, 181))
     assert "coarse_places" in {task.codelet for task in desk.take()}
 
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 import colorsys
 import math
 import zlib
-from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -16,7 +15,7 @@ from cogmap.data.osm import Extract, Tags, Way
 from cogmap.geometry.arrays import Floats
 from cogmap.services.sim.layout.catalogue import BuildingType, Colour
 from cogmap.services.sim.layout.osm.streets import Positions, metres
-from cogmap.services.sim.layout.plan import Plot, Point
+from cogmap.services.sim.layout.plan import Plot
 
 LEVEL_M = 3.0
 USUAL_M = 7.0
@@ -25,6 +24,7 @@ HIGHEST_M = 120.0
 SMALLEST_M2 = 8.0
 STRAIGHT_M = 0.2
 CORNERS = 3
+MAX_NAME = 200
 NO_WALLS = ("no", "roof", "carport")
 _TRIM: Colour = (240, 238, 232)
 _ROOF: Colour = (110, 100, 96)
@@ -39,18 +39,9 @@ _FUNCTIONS = {
 }
 
 
-class Rectangle(NamedTuple):
-    """The smallest rectangle around a footprint."""
-
-    middle: Point
-    length_m: float
-    width_m: float
-    heading_rad: float
-
-
 def plots(extract: Extract, at_m: Positions) -> list[Plot]:
-    """The buildings of an extract whose nodes are `at_m`. Those without walls, and those that are
-    cut off or tiny, are left out.
+    """Make the buildings of an extract whose nodes are `at_m`. Those without walls, and those that
+    are cut off or tiny, are left out.
     """
     found = []
     names: set[str] = set()
@@ -59,18 +50,26 @@ def plots(extract: Extract, at_m: Positions) -> list[Plot]:
         if len(outline_m) < CORNERS:
             continue
 
-        name = _name(way)
+        tags = way.tags
+        name = tags.get("name", f"building {way.id}")
+        if "name" not in tags and "addr:housenumber" in tags and "addr:street" in tags:
+            name = f"{tags['addr:street']} {tags['addr:housenumber']}"
+        name = name[:MAX_NAME]
         if name in names:
             name = f"{name} ({way.id})"
         names.add(name)
-        found.append(_plot(name, way.tags, outline_m))
+        found.append(_plot(name, tags, outline_m))
 
     return found
 
 
 def _outline_m(way: Way, at_m: Positions) -> Floats:
-    """(n, 2): the corners of a building, counter-clockwise; none where the way is no building."""
-    if not _has_walls(way, at_m):
+    """Return the corners of a building, counter-clockwise, (n, 2); none if the way is no whole
+    outline of a building with walls.
+    """
+    is_ring = len(way.nodes) > CORNERS and way.nodes[0] == way.nodes[-1]
+    has_walls = way.tags.get("building", "no") not in NO_WALLS
+    if not is_ring or not has_walls or not all(node in at_m for node in way.nodes):
         return np.zeros((0, 2))
 
     corners_m = [at_m[node] for node in way.nodes[:-1]]
@@ -81,51 +80,43 @@ def _outline_m(way: Way, at_m: Positions) -> Floats:
     area_m2 = cv2.contourArea(simple, oriented=True)
     if abs(area_m2) < SMALLEST_M2:
         return np.zeros((0, 2))
-
     return outline_m if area_m2 > 0 else outline_m[::-1]
 
 
-def _has_walls(way: Way, at_m: Positions) -> bool:
-    """Whether a way is the whole outline of a building with walls."""
-    kind = way.tags.get("building", "no")
-    if kind in NO_WALLS or len(way.nodes) <= CORNERS:
-        return False
-
-    is_closed = way.nodes[0] == way.nodes[-1]
-    return is_closed and all(node in at_m for node in way.nodes)
-
-
-def _name(way: Way) -> str:
-    """Its name or, where it has none, its address or its number."""
-    tags = way.tags
-    if "name" in tags:
-        return tags["name"][:200]
-
-    number = tags.get("addr:housenumber")
-    street = tags.get("addr:street")
-    if number and street:
-        return f"{street} {number}"[:200]
-
-    return f"building {way.id}"
-
-
 def _plot(name: str, tags: Tags, outline_m: Floats) -> Plot:
-    around = _rectangle(outline_m)
-    kind = _kind(name, around, height_m(tags))
-    x_m, y_m = around.middle
+    """Make a building with the smallest rectangle around its outline. Nothing is known of what it
+    looks like, so that is drawn from its name.
+    """
+    middle_m, size_m, degrees = cv2.minAreaRect(outline_m.astype(np.float32))
+    x_m, y_m = middle_m
+    length_m, width_m = size_m
+    rng = np.random.default_rng(zlib.crc32(name.encode()))
+    hue = float(rng.random())
 
+    kind = BuildingType(
+        name=name,
+        width_m=round(float(length_m), 2),
+        depth_m=round(float(width_m), 2),
+        height_m=round(height_m(tags), 2),
+        wall=_paint(hue, 0.35, 0.85),
+        accent=_paint((hue + 0.4) % 1.0, 0.5, 0.45),
+        trim=_TRIM,
+        door=_paint((hue + 0.7) % 1.0, 0.5, 0.4),
+        roof=_ROOF,
+        pattern=str(rng.choice(_PATTERNS)),
+    )
     return Plot(
         kind=kind,
-        x_m=round(x_m, 2),
-        y_m=round(y_m, 2),
-        heading_rad=around.heading_rad,
+        x_m=round(float(x_m), 2),
+        y_m=round(float(y_m), 2),
+        heading_rad=math.remainder(math.radians(degrees), math.tau),
         function=function(tags),
         outline=tuple((x, y) for x, y in outline_m.tolist()),
     )
 
 
 def height_m(tags: Tags) -> float:
-    """The height that a building is tagged with, that of its levels, or the usual one."""
+    """Return the height that a building is tagged with, that of its levels, or the usual one."""
     height = metres(tags.get("height", ""))
     levels = metres(tags.get("building:levels", ""))
     if height is None:
@@ -135,7 +126,7 @@ def height_m(tags: Tags) -> float:
 
 
 def function(tags: Tags) -> str:
-    """What a building is used for: a shop, a school, an office, works, or otherwise a home."""
+    """Return what a building is for: a shop, a school, an office, works, or otherwise a home."""
     if "shop" in tags:
         return "shop"
 
@@ -145,39 +136,6 @@ def function(tags: Tags) -> str:
             return name
 
     return "home"
-
-
-def _rectangle(outline_m: Floats) -> Rectangle:
-    middle, size_m, degrees = cv2.minAreaRect(outline_m.astype(np.float32))
-    x_m, y_m = middle
-    length_m, width_m = size_m
-    heading_rad = math.remainder(math.radians(degrees), math.tau)
-
-    return Rectangle(
-        middle=(float(x_m), float(y_m)),
-        length_m=float(length_m),
-        width_m=float(width_m),
-        heading_rad=heading_rad,
-    )
-
-
-def _kind(name: str, around: Rectangle, height: float) -> BuildingType:
-    """What it looks like: nothing is known of that, so it is drawn from its name."""
-    rng = np.random.default_rng(zlib.crc32(name.encode()))
-    hue = float(rng.random())
-
-    return BuildingType(
-        name=name,
-        width_m=round(around.length_m, 2),
-        depth_m=round(around.width_m, 2),
-        height_m=round(height, 2),
-        wall=_paint(hue, 0.35, 0.85),
-        accent=_paint((hue + 0.4) % 1.0, 0.5, 0.45),
-        trim=_TRIM,
-        door=_paint((hue + 0.7) % 1.0, 0.5, 0.4),
-        roof=_ROOF,
-        pattern=str(rng.choice(_PATTERNS)),
-    )
 
 
 def _paint(hue: float, saturation: float, value: float) -> Colour:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable
 from itertools import pairwise
@@ -30,13 +31,23 @@ NARROWEST_M = 3.0
 WIDEST_M = 30.0
 # A bend that leaves the straight line by less is straightened.
 STRAIGHT_M = 0.4
-_LINK = "_link"
 
 Positions = dict[int, Point]
 
 
+# A length as mappers write it: metres unless it names feet (wiki.openstreetmap.org, Map features/
+# Units), "~" and "+" allowed.
+FOOT_M = 0.3048
+INCH_M = 0.0254
+_LENGTH = re.compile(
+    r"~?\s*(?P<number>\d+(?:[.,]\d+)?)\s*"
+    r"(?:m|metres?|meters?|(?P<feet>ft|foot|feet|')\s*(?:(?P<inches>\d+(?:[.,]\d+)?)\s*(?:\"|''|in))?)?"
+    r"\s*\+?"
+)
+
+
 def is_street(way: Way) -> bool:
-    """Whether cars may drive along a way, in the open and on the ground."""
+    """Return if cars may drive along a way, in the open and on the ground."""
     tags = way.tags
     if _kind(tags) not in WIDTHS_M or tags.get("area") == "yes":
         return False
@@ -47,7 +58,7 @@ def is_street(way: Way) -> bool:
 
 
 def width_m(tags: Tags) -> float:
-    """The width that a way is tagged with or, where it is not, the usual one of its kind."""
+    """Return the width that a way is tagged with or, without, the usual one of its kind."""
     width = metres(tags.get("width", ""))
     if width is None:
         width = WIDTHS_M[_kind(tags)]
@@ -56,51 +67,54 @@ def width_m(tags: Tags) -> float:
 
 
 def _kind(tags: Tags) -> str:
-    """Its value of `highway`; a link is of the kind that it leads to."""
-    return tags.get("highway", "").removesuffix(_LINK)
+    """Return its value of `highway`; a link is of the kind that it leads to."""
+    return tags.get("highway", "").removesuffix("_link")
 
 
 def metres(text: str) -> float | None:
-    """The metres that a tag gives, such as "7.5" or "7.5 m"; None where it gives none."""
-    number = text.strip().removesuffix("m").strip().replace(",", ".")
-    try:
-        value = float(number)
-    except ValueError:
-        return None
+    """Return the metres that a tag gives, such as "7.5", "7.5 m" or "24'6\"", of several such as
+    "2;3" the most; None if it gives none.
+    """
+    found = [_LENGTH.fullmatch(value.strip()) for value in text.split(";")]
+    lengths_m = []
+    for length in found:
+        if length is None:
+            return None
+        unit_m = FOOT_M if length["feet"] else 1.0
+        value_m = unit_m * float(length["number"].replace(",", "."))
+        value_m += INCH_M * float((length["inches"] or "0").replace(",", "."))
+        lengths_m.append(value_m)
 
-    return value if 0.0 < value < 1000.0 else None
+    most_m = max(lengths_m)
+    return most_m if 0.0 < most_m < 1000.0 else None
 
 
 def roads(extract: Extract, at_m: Positions) -> list[Road]:
-    """The roads of an extract whose nodes are `at_m`: of a street that bends between two crossings
-    several of one name, such as "Rue Grimaldi 3".
+    """Make the roads of an extract whose nodes are `at_m`: of a street that bends between two
+    crossings several of one name, such as "Rue Grimaldi 3".
     """
     ways = [way for way in extract.ways if is_street(way)]
     uses: Counter[int] = Counter()
     for way in ways:
-        uses.update(_known(way, at_m))
+        for piece in extract.pieces(way):
+            uses.update(piece)
 
     numbers: Counter[str] = Counter()
     found = []
     for way in ways:
         kind = way.tags["highway"]
         title = way.tags.get("name", f"{kind} way")
-        for stretch in _stretches(_known(way, at_m), uses):
-            numbers[title] += 1
-            name = f"{title} {numbers[title]}"
-            line_m = np.array([at_m[node] for node in stretch])
-            found += _straight(name, line_m, width_m(way.tags))
+        for piece in extract.pieces(way):
+            for stretch in _stretches(piece, uses):
+                numbers[title] += 1
+                line_m = np.array([at_m[node] for node in stretch])
+                found += _straight(f"{title} {numbers[title]}", line_m, width_m(way.tags))
 
     return found
 
 
-def _known(way: Way, at_m: Positions) -> list[int]:
-    """The nodes of a way whose positions are known."""
-    return [node for node in way.nodes if node in at_m]
-
-
 def _stretches(nodes: list[int], uses: Counter[int]) -> Iterable[list[int]]:
-    """A way, cut at the nodes that others share with it."""
+    """Cut a way at the nodes that others share with it."""
     stretch = nodes[:1]
     for node in nodes[1:]:
         stretch.append(node)
@@ -113,14 +127,20 @@ def _stretches(nodes: list[int], uses: Counter[int]) -> Iterable[list[int]]:
 
 
 def _straight(name: str, line_m: Floats, width: float) -> list[Road]:
-    """A road for each straight piece of a line."""
-    contour = line_m.astype(np.float32)[:, None]
-    corners = cv2.approxPolyDP(contour, STRAIGHT_M, closed=False)
-    corners_m: list[Point] = [(round(x, 2), round(y, 2)) for x, y in corners[:, 0].tolist()]
+    """Make a road of each straight piece of a line."""
+    parts_m = [line_m]
+    if (line_m[0] == line_m[-1]).all():
+        # Between the ends of a ring is no straight line that a bend could leave: it is halved.
+        farthest = int(np.hypot(*(line_m - line_m[0]).T).argmax())
+        parts_m = [line_m[: farthest + 1], line_m[farthest:]]
 
     pieces = []
-    for start, end in pairwise(corners_m):
-        if start != end:
-            pieces.append(Road(name, start, end, width))
+    for part_m in parts_m:
+        contour = part_m.astype(np.float32)[:, None]
+        corners = cv2.approxPolyDP(contour, STRAIGHT_M, closed=False)
+        corners_m: list[Point] = [(round(x, 2), round(y, 2)) for x, y in corners[:, 0].tolist()]
+        for start, end in pairwise(corners_m):
+            if start != end:
+                pieces.append(Road(name, start, end, width))
 
     return pieces

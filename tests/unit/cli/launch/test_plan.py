@@ -21,7 +21,7 @@ from cogmap.cli.launch.plan import (
     to_toml,
 )
 from cogmap.cli.launch.supervisor import Program
-from cogmap.cli.run.command import LAP_LIMIT_S
+from cogmap.cli.run.options import LAP_LIMIT_S
 from cogmap.errors import ConfigError
 from cogmap.services import registry
 from cogmap.services.sim.config import Config as SimConfig

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
-from cogmap.cli.launch.metrics import DriveMetrics, RunMetrics, drive_metrics
+from cogmap.cli.launch.drive_metrics import DriveMetrics, RunMetrics, drive_metrics
 from cogmap.cli.launch.watch import Watch
 from cogmap.cli.plots import map as plot
 from cogmap.cli.run.summary import drive_rows

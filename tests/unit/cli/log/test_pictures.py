@@ -311,7 +311,7 @@ def placed(labels: list[Label]) -> tuple[Axes, list[Bbox]]:
         ),
         (
             ["image", "--camera", "left", "--depth"],
-            r"leave --camera out, or --depth and --percepts",
+            r"leave out --camera, or --depth and --percepts",
         ),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

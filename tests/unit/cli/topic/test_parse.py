@@ -28,7 +28,7 @@ def test_a_message_is_read_from_json() -> None:
 @pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
 def test_what_echo_prints_in_full_can_be_published_again(topic: Topic) -> None:
     example = BY_TOPIC[topic]
-    printed = formatter(None, True, False, "json")(example)
+    printed = formatter((), True, False, "json")(example)
 
     assert parse(topic, printed) == example
 
@@ -58,7 +58,7 @@ def test_a_wrong_field_is_named_with_what_was_expected(written: str, sentence: s
 
 
 def test_a_wrong_field_deep_inside_is_named_with_its_place() -> None:
-    plain = json.loads(formatter(None, True, False, "json")(BY_TOPIC[topics.PERCEPTS]))
+    plain = json.loads(formatter((), True, False, "json")(BY_TOPIC[topics.PERCEPTS]))
     plain["objects"][0]["labell"] = "x"
 
     with pytest.raises(
@@ -88,22 +88,31 @@ def test_what_is_answered_on_request_cannot_be_watched() -> None:
 
 
 def test_echo_shows_one_field_or_names_those_that_there_are() -> None:
-    speed = formatter("speed_m_s", False, False, "text")
+    speed = formatter(("speed_m_s",), False, False, "text")
     assert speed(ODOMETRY) == "1.5\n---"
 
-    unknown = formatter("speed", False, False, "text")
+    unknown = formatter(("speed",), False, False, "text")
     with pytest.raises(UsageError, match=r"--field speed: no 'speed' .*speed_m_s"):
         unknown(ODOMETRY)
 
 
+def test_echo_shows_every_field_that_is_named() -> None:
+    fields = ("dt_s", "speed_m_s")
+
+    assert formatter(fields, False, False, "text")(ODOMETRY) == "dt_s: 0.05\nspeed_m_s: 1.5\n---"
+    assert formatter(fields, False, False, "csv")(ODOMETRY) == "0.05,1.5"
+    as_json = formatter(fields, False, False, "json")(ODOMETRY)
+    assert json.loads(as_json) == {"dt_s": 0.05, "speed_m_s": 1.5}
+
+
 def test_echo_prints_a_line_of_csv_a_message() -> None:
-    as_csv = formatter(None, False, False, "csv")
+    as_csv = formatter((), False, False, "csv")
 
     assert as_csv(ODOMETRY) == "7,3,sim,1.5,0.0,0.05"
 
 
 def test_echo_leaves_the_numbers_of_arrays_out_where_asked() -> None:
-    assert "motions: '<array type: <f8[4, 3]>'" in formatter(None, False, True, "text")(
+    assert "motions: '<array type: <f8[4, 3]>'" in formatter((), False, True, "text")(
         BY_TOPIC[topics.SELF_MOTION]
     )
 

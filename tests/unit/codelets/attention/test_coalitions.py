@@ -19,12 +19,12 @@ from cogmap.schemas.nodes import (
     map_id,
 )
 from cogmap.services.codelets.attention.coalitions import coalition
-from cogmap.services.codelets.attention.config import Config
+from cogmap.services.codelets.attention.novelty import Config
 from cogmap.testing import agent, graph_of, landmark, percept, task
 from tests.support.world.scenes import run
 
 CONFIG = Config()
-NOVEL_SIGHTINGS = CONFIG.novelty.novel_sightings
+NOVEL_SIGHTINGS = CONFIG.novel_sightings
 
 
 def _content(*activations: float, salience: float = 0.0) -> list[AnyNode]:
@@ -34,8 +34,8 @@ def _content(*activations: float, salience: float = 0.0) -> list[AnyNode]:
     ]
 
 
-def _activation(content: list[AnyNode], base_level: float = 1.0) -> float:
-    return coalition("test", content, graph_of(), base_level).activation
+def _activation(content: list[AnyNode]) -> float:
+    return coalition("test", content, graph_of()).activation
 
 
 def test_a_coalitions_activation_is_lidas_formula() -> None:
@@ -43,7 +43,6 @@ def test_a_coalitions_activation_is_lidas_formula() -> None:
     salient = _content(0.4, 0.8, salience=-0.6)
 
     assert _activation(neutral) == pytest.approx((0.4 + 0.8) / 4)
-    assert _activation(neutral, base_level=0.5) == pytest.approx(0.5 * (0.4 + 0.8) / 4)
     assert _activation(salient) == pytest.approx((0.4 + 0.8 + 1.2) / 4)
 
 
@@ -52,9 +51,9 @@ def test_a_link_is_as_active_and_salient_as_the_node_that_it_begins_at() -> None
     at = Link(source=node.id, target="place:map:0:0:0")
     near = Link(source=node.id, target="b", kind="near", weight=0.5)
     placed = graph_of(node, at)
-    linked = coalition("test", [node], placed, 1.0, [near])
+    linked = coalition("test", [node], placed, [near])
 
-    assert coalition("test", [node], placed, 1.0).activation == pytest.approx(1.0 / 2)
+    assert coalition("test", [node], placed).activation == pytest.approx(1.0 / 2)
     assert linked.links == [at, near]
     assert linked.activation == pytest.approx((1.0 + 1.0 + 0.5) / 6)
 
@@ -64,13 +63,13 @@ def test_a_coalition_is_of_the_maps_and_the_sub_maps_that_its_objects_are_on() -
     within = Link(source=one.id, target=map_id(2), kind=LinkKind.WITHIN)
     graph = graph_of(one, other, within)
 
-    assert coalition("test", [one, other], graph, 1.0).maps == [ROOT_MAP, map_id(2)]
+    assert coalition("test", [one, other], graph).maps == [ROOT_MAP, map_id(2)]
 
 
 def test_a_coalition_leaves_the_route_of_a_plan_behind() -> None:
     route = Matrix.of([[0.0, 0.0], [1.0, 0.0]])
     plan = Plan(id="plan", state=PlanState.READY, length_m=1.0, route=route)
-    (brought,) = coalition("test", [plan], graph_of(plan), 1.0).nodes
+    (brought,) = coalition("test", [plan], graph_of(plan)).nodes
 
     assert isinstance(brought, Plan)
     assert (brought.route, brought.length_m) == (None, 1.0)
@@ -163,10 +162,10 @@ def test_relations_make_a_coalition_no_more_active() -> None:
     graph = graph_of(agent(), landmark("house"))
     nodes: list[AnyNode] = [agent(), landmark("house")]
 
-    related = coalition("test", nodes, graph, 1.0, percepts=[percept("house")])
+    related = coalition("test", nodes, graph, percepts=[percept("house")])
 
     assert related.relations
-    assert related.activation == coalition("test", nodes, graph, 1.0).activation
+    assert related.activation == coalition("test", nodes, graph).activation
 
 
 def test_what_was_felt_about_a_percept_makes_its_object_salient() -> None:

@@ -7,18 +7,17 @@ import numpy as np
 import pytest
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, CycleContext
+from cogmap.runtime.codelet import Answer, CycleContext, NoSettings
 from cogmap.schemas.array import Array
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Delta, Operation, Phase
 from cogmap.schemas.nodes import Attention, attention_id
 from cogmap.schemas.sensing import Percept, RangeScan
 from cogmap.services.codelets.attention import danger
-from cogmap.services.codelets.attention.config import Config, Danger
 from cogmap.testing import agent, graph_of, landmark, percept, percepts
 from tests.support.world.scenes import run
 
-CONFIG = Config(danger=Danger(refractory_cycles=1, same_cycles=5))
+CONFIG = NoSettings()
 BEARINGS_RAD = np.linspace(-0.6, 0.6, 13)
 NEAR_M = 2.7
 TWO_AHEAD = (0.0, 0.1)
@@ -109,7 +108,7 @@ def test_after_a_while_without_one_a_danger_is_another() -> None:
     story.brought(BLOCKED, 1)
     story.broadcast()
 
-    story.brought(FREE, 3)
+    story.brought(FREE, danger.SAME_CYCLES - 2)
     assert story.brought(BLOCKED, 2) == 0
-    story.brought(FREE, 8)
+    story.brought(FREE, danger.SAME_CYCLES + 2)
     assert story.brought(BLOCKED, 1) == 1

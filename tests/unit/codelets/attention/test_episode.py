@@ -6,16 +6,15 @@ import numpy as np
 import pytest
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import CycleContext
+from cogmap.runtime.codelet import CycleContext, NoSettings
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Decay, Delta, Phase
 from cogmap.schemas.nodes import Episode, Remembered, episode_id
 from cogmap.services.codelets.attention import episode
-from cogmap.services.codelets.attention.config import Config
 from cogmap.testing import agent, graph_of, percepts, task
 from tests.support.world.scenes import run
 
-CONFIG = Config()
+CONFIG = NoSettings()
 BAKERY = Remembered(kind="object", label="bakery")
 
 

@@ -28,14 +28,14 @@ from cogmap.schemas.nodes import (
     place_cell,
     segment_id,
 )
-from cogmap.services.codelets.attention.config import Config, Expectation
-from cogmap.services.codelets.attention.disappearance import MANY_OBJECTS
-from cogmap.testing import agent, cells, graph_of, landmark, percept, task
+from cogmap.services.codelets.attention.disappearance import MAX_OBJECTS
+from cogmap.services.codelets.attention.expectation import Config
+from cogmap.testing import agent, graph_of, landmark, percept, task
 from tests.support.world.scenes import run
 
 VIEWS = 3
 """So many in which rays pass where a house stood are a surprise; twice as many without."""
-CONFIG = Config(expectation=Expectation(views=2 * VIEWS, refractory_cycles=1))
+CONFIG = Config(views=2 * VIEWS)
 HOUSE_M = 20.0
 BEARINGS_RAD = np.linspace(-0.5, 0.5, 21)
 
@@ -198,7 +198,7 @@ def test_an_agent_that_does_not_know_where_it_is_expects_nothing() -> None:
 
 def test_on_a_map_of_many_objects_the_same_is_expected() -> None:
     crowd = []
-    for number in range(MANY_OBJECTS + 1):
+    for number in range(MAX_OBJECTS + 1):
         crowd.append(landmark(f"far-{number}", [(1000.0, number)], sightings=50))
     house = _house()
     at = _at_its_place(house)
@@ -211,8 +211,9 @@ def _at_its_place(house: AnyNode) -> Operation:
     return Link(source=house.id, target=f"place:map:0:{round(HOUSE_M)}:0", kind=LinkKind.AT)
 
 
-def _cells(column: PlaceColumn, marked: list[tuple[int, int]]) -> Cells:
-    return cells(column, dict.fromkeys(marked, 1.0))
+def _cells(column: PlaceColumn, cells: list[tuple[int, int]]) -> Cells:
+    values = np.ones(len(cells), np.float32)
+    return Cells(column=column, cells=Array.of(np.array(cells, np.int32)), values=Array.of(values))
 
 
 ROUTE_M = [(float(i), 0.0) for i in range(60)]

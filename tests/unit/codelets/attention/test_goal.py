@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, CycleContext
+from cogmap.runtime.codelet import Answer, CycleContext, NoSettings
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.graph import Delta, Link, Operation, Phase
 from cogmap.schemas.nodes import (
@@ -23,12 +23,10 @@ from cogmap.schemas.nodes import (
     goal_id,
 )
 from cogmap.services.codelets.attention import goal
-from cogmap.services.codelets.attention.config import Config
-from cogmap.services.codelets.attention.config import Goal as Settings
 from cogmap.testing import agent, graph_of, percepts
 from tests.support.world.scenes import run
 
-CONFIG = Config(goal=Settings(refractory_cycles=1, change_salience=0.5))
+CONFIG = NoSettings()
 INN = goal_id("inn")
 TOWARDS = Link(source=PLAN_ID, target=INN, kind=LinkKind.TOWARDS)
 
@@ -63,6 +61,12 @@ class Story:
             return {node.id: node.salience for node in found.nodes}
         return None
 
+    def waits(self) -> bool:
+        """If nothing is brought for as long as the refractory period lasts."""
+        return [self.cycle() for _ in range(goal.REFRACTORY_CYCLES)] == [
+            None
+        ] * goal.REFRACTORY_CYCLES
+
     def broadcast(self) -> None:
         """What was brought last becomes conscious."""
         memory = self.graph.get(Attention, attention_id("goal"))
@@ -85,11 +89,11 @@ def test_a_plan_that_is_new_is_salient_until_it_is_conscious() -> None:
     story = Story(_inn(), _plan(), TOWARDS)
     new = {"self": 0.0, PLAN_ID: 0.5, INN: 0.0}
     assert story.cycle() == new
-    assert story.cycle() is None
+    assert story.waits()
     assert story.cycle() == new
 
     story.broadcast()
-    assert story.cycle() is None
+    assert story.waits()
     assert story.cycle() == {"self": 0.0, PLAN_ID: 0.0, INN: 0.0}
 
 
@@ -103,10 +107,12 @@ def test_a_goal_that_is_reached_is_salient_once() -> None:
     story.broadcast()
     arrived = _plan(2, state=PlanState.AT_GOAL, goals=[], route=None)
     assert story.cycle(_inn(reached_ns=5), arrived) is None
+    for _ in range(goal.REFRACTORY_CYCLES - 1):
+        assert story.cycle() is None
 
     assert story.cycle() == {"self": 0.0, PLAN_ID: 0.5, INN: 0.5}
     story.broadcast()
-    assert [story.cycle() for _ in range(4)] == [None] * 4
+    assert [story.cycle() for _ in range(8)] == [None] * 8
 
 
 def test_a_plan_that_has_no_route_is_brought_once() -> None:
@@ -115,7 +121,7 @@ def test_a_plan_that_has_no_route_is_brought_once() -> None:
     assert story.cycle() == {"self": 0.0, PLAN_ID: 0.5}
     story.broadcast()
 
-    assert [story.cycle() for _ in range(4)] == [None] * 4
+    assert [story.cycle() for _ in range(8)] == [None] * 8
 
 
 def test_the_plan_is_linked_to_its_next_goal() -> None:

@@ -16,7 +16,7 @@ from cogmap.schemas.nodes import (
     need_id,
     object_id,
 )
-from cogmap.services.codelets.attention.config import Config
+from cogmap.services.codelets.attention.need import Config
 from cogmap.testing import agent, graph_of, task
 from tests.support.world.scenes import run
 

@@ -6,17 +6,16 @@ import msgspec
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import Answer, CycleContext
+from cogmap.runtime.codelet import Answer, CycleContext, NoSettings
 from cogmap.schemas.array import Array
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Delta, Operation, Phase
-from cogmap.schemas.nodes import Attention, attention_id
+from cogmap.schemas.nodes import Attention, Misfits, attention_id
 from cogmap.services.codelets.attention import place_lost
-from cogmap.services.codelets.attention.config import Config
 from cogmap.testing import agent, graph_of, landmark, percepts, task
 from tests.support.world.scenes import run
 
-CONFIG = Config()
+CONFIG = NoSettings()
 MEMORY = attention_id("place_lost")
 
 
@@ -28,7 +27,8 @@ class Story:
 
     def cycle(self, is_lost: bool) -> Answer:
         """The answer in the next cycle; nothing where no task is due."""
-        self._commit(Phase.LOCALIZATION, [agent(is_lost=is_lost)], self.graph.cycle + 1)
+        here = agent(misfits=Misfits(is_lost=is_lost))
+        self._commit(Phase.LOCALIZATION, [here], self.graph.cycle + 1)
         motions = Array.of(np.zeros((0, 5)))
         context = CycleContext(self.graph.cycle, percepts(self.graph.cycle), motions)
         answer = Answer()
@@ -85,7 +85,7 @@ def test_that_it_was_found_is_brought_until_it_is_conscious() -> None:
 
 
 def test_what_did_not_fit_is_brought_with_that_the_agent_is_lost() -> None:
-    lost = agent(is_lost=True, first_misfit="tower")
+    lost = agent(misfits=Misfits(is_lost=True, label="tower"))
     known = graph_of(lost, landmark("tower"), landmark("house"))
     (found,) = run(task("place_lost"), known, CONFIG).coalitions
 

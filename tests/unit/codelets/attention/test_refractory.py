@@ -7,17 +7,16 @@ import numpy as np
 import pytest
 
 from cogmap.graph.graph import Graph
-from cogmap.runtime.codelet import CycleContext
+from cogmap.runtime.codelet import CycleContext, NoSettings
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.nodes import Attention, Need, attention_id, need_id
-from cogmap.services.codelets.attention import need, novelty, whereabouts
-from cogmap.services.codelets.attention.config import Config, Novelty, Whereabouts
-from cogmap.services.codelets.attention.memory import without_conscious
+from cogmap.services.codelets.attention import need
+from cogmap.services.codelets.attention.pending import is_refractory, without_conscious
 from cogmap.testing import agent, graph_of, landmark, percept, percepts, task
 from tests.support.world.scenes import run
 
-PATIENT = Config(novelty=Novelty(refractory_cycles=2))
+NOTHING = NoSettings()
 NO_MOTION = Array.of(np.zeros((0, 5)))
 
 
@@ -30,10 +29,10 @@ def _context(cycle: int) -> CycleContext:
     return CycleContext(cycle, percepts(cycle, percept("house")), NO_MOTION)
 
 
-def _after(graph: Graph, codelet: str, config: Config) -> Graph:
+def _after(graph: Graph, codelet: str) -> Graph:
     """The graph after `codelet` has brought a coalition in cycle 1."""
     asked = task(codelet, percepts=[percept("house")])
-    answer = run(asked, graph, config)
+    answer = run(asked, graph, NOTHING)
     assert len(answer.coalitions) == 1
 
     delta = Delta(version=2, cycle=1, phase=Phase.ATTENTION, operations=answer.operations)
@@ -43,40 +42,31 @@ def _after(graph: Graph, codelet: str, config: Config) -> Graph:
 
 @pytest.mark.parametrize(("waits", "cycles"), [(0, [2, 3, 4]), (1, [3, 4]), (2, [4])])
 def test_a_codelet_waits_for_its_refractory_period(waits: int, cycles: list[int]) -> None:
-    config = Config(novelty=Novelty(refractory_cycles=waits))
-    graph = _after(_scene(), "novelty", config)
+    graph = _after(_scene(), "novelty")
 
-    ready = [cycle for cycle in (2, 3, 4) if novelty.due(_context(cycle), graph, config)]
+    ready = [cycle for cycle in (2, 3, 4) if not is_refractory("novelty", graph, cycle, waits)]
     assert ready == cycles
 
 
 def test_the_default_codelet_brings_what_is_in_view_in_each_cycle_and_keeps_nothing() -> None:
-    answer = run(task("whereabouts", percepts=[percept("house")]), _scene(), Config())
+    answer = run(task("whereabouts", percepts=[percept("house")]), _scene(), NOTHING)
 
     assert len(answer.coalitions) == 1
     assert answer.operations == []
 
 
-def test_the_default_codelet_waits_too_where_it_is_configured_so() -> None:
-    config = Config(whereabouts=Whereabouts(refractory_cycles=1))
-    graph = _after(_scene(), "whereabouts", config)
-
-    assert whereabouts.due(_context(2), graph, config) == []
-    assert len(whereabouts.due(_context(3), graph, config)) == 1
-
-
 def test_codelets_wait_for_themselves_alone() -> None:
-    graph = _after(_scene(), "novelty", PATIENT)
+    graph = _after(_scene(), "novelty")
 
-    assert len(need.due(_context(2), graph, PATIENT)) == 1
+    assert len(need.due(_context(2), graph, need.Config())) == 1
 
 
 def test_a_restored_graph_keeps_codelets_waiting() -> None:
     restored = Graph()
-    restored.load(_after(_scene(), "novelty", PATIENT).snapshot())
+    restored.load(_after(_scene(), "need").snapshot())
 
-    assert novelty.due(_context(3), restored, PATIENT) == []
-    assert len(novelty.due(_context(4), restored, PATIENT)) == 1
+    assert need.due(_context(5), restored, need.Config()) == []
+    assert len(need.due(_context(6), restored, need.Config())) == 1
 
 
 @pytest.mark.parametrize(("conscious", "pending"), [(0, 2), (6, 2), (7, 1), (9, 0)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
@@ -74,18 +76,18 @@ def test_with_one_side_a_landmark_stays_one() -> None:
     assert one_side.landmark.tolist() == seen.landmark.tolist()
 
 
-@pytest.mark.parametrize("sides", [1, 16])
+@pytest.mark.parametrize("landmarks", ["points", "buildings"])
 def test_a_bias_by_side_bends_a_good_path_only_as_a_single_landmark(
-    sides: int,
+    landmarks: Literal["points", "buildings"],
 ) -> None:
     graph = _graph(_steps(1))
     seen = _sightings(graph.poses)
-    config = Config(landmark_sides=sides)
+    config = Config(landmarks=landmarks)
 
     poses, _ = optimize_jointly(graph, seen, config)
     bent_m = mean_distance_m(poses, graph.poses)
 
-    assert bent_m > 0.2 if sides == 1 else bent_m < 0.1
+    assert bent_m > 0.2 if landmarks == "points" else bent_m < 0.1
 
 
 def test_sides_bind_the_second_lap_to_the_first() -> None:

@@ -333,12 +333,8 @@ def _house_error_m(drive: LoopDrive) -> float:
     return math.hypot(house.x_m - x_m, house.y_m - y_m)
 
 
-@pytest.mark.parametrize("waiting_share", [0.0, 0.1])
-def test_a_corrected_map_that_the_next_drive_contradicts_is_taken_back(
-    waiting_share: float,
-) -> None:
-    config = msgspec.structs.replace(QUIET, waiting_share=waiting_share)
-    drive = round_once(LoopDrive(config))
+def test_a_corrected_map_that_the_next_drive_contradicts_is_taken_back() -> None:
+    drive = round_once(LoopDrive())
     # Sixteen metres off: not more than path integration may have been wrong by.
     drive.meet(3, late=8)
     drive.go(5, {})

@@ -15,7 +15,7 @@ from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.correction.map_correction import CODELET
 from cogmap.testing import graph_of
 
-CONFIG = Config(closure_spacing_s=2.0, revisit_s=100.0, waiting_share=0.0)
+CONFIG = Config(closure_spacing_s=2.0, revisit_s=100.0)
 A_SECOND_NS = 1_000_000_000
 NO_POINTS = Array.of(np.zeros((0, 2), np.float32))
 NO_MOTIONS = Array.of(np.zeros((0, 5)))
@@ -88,14 +88,13 @@ def test_closures_that_the_path_explains_wait(range_m: tuple[float, ...], is_due
     assert _is_due(_with_fresh(*range_m), 14, Config(revisit_s=100.0)) is is_due
 
 
-@pytest.mark.parametrize(("share", "is_due"), [(0.2, True), (0.5, False)])
-def test_a_share_of_closures_that_the_path_does_not_explain_waits(
-    share: float, is_due: bool
+@pytest.mark.parametrize(("explained", "is_due"), [(26, True), (37, False)])
+def test_a_tenth_of_closures_that_the_path_does_not_explain_waits(
+    explained: int, is_due: bool
 ) -> None:
-    graph = _with_fresh(*[1.0] * 7, *[4.0] * 4)
-    config = Config(revisit_s=100.0, waiting_share=share)
+    graph = _with_fresh(*[1.0] * explained, *[4.0] * 4)
 
-    assert _is_due(graph, 23, config) is is_due
+    assert _is_due(graph, 53, Config(revisit_s=100.0)) is is_due
 
 
 def test_the_first_closures_of_a_path_do_not_wait() -> None:

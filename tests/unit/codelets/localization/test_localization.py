@@ -187,7 +187,7 @@ def test_path_integration_continues_beside_the_pose_landmarks_correct() -> None:
     )
 
     assert found.x_m > 5.5
-    assert found.odometry_x_m == pytest.approx(5.0)
+    assert found.odometry.x_m == pytest.approx(5.0)
 
 
 def test_the_self_node_is_linked_to_the_place_of_its_mean_alone() -> None:

@@ -8,18 +8,16 @@ import numpy as np
 import pytest
 
 from cogmap.schemas.nodes import NEVER_NS
-from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.localization.information import new_share, variances_at
 from cogmap.services.codelets.localization.measurement_model import (
     Sighting,
     compare,
     log_likelihood,
     sightings,
 )
-from cogmap.services.codelets.localization.novelty import novelty, variances_at
 from cogmap.services.codelets.mapping.path import segments
 from cogmap.testing import graph_of, landmark, percept
 
-CONFIG = Config()
 RANGE_M = 10.0
 AGENT_SD_M = 0.5
 
@@ -37,7 +35,7 @@ def _seen() -> Sighting:
     where_m = rng.normal((RANGE_M, 0.0), 0.1, (200, 2))
     graph = graph_of(landmark("house", where_m, sightings=5))
 
-    found = sightings([percept("house")], graph, CONFIG.largest_landmark_sd_m, NEVER_NS)
+    found = sightings([percept("house")], graph, 4.0, NEVER_NS)
     assert found is not None
     return found
 
@@ -56,7 +54,7 @@ def _seen() -> Sighting:
 def test_a_landmark_informs_by_the_uncertainty_since_it_was_placed(
     since: tuple[float, float], share: float
 ) -> None:
-    found = novelty(_agent(), _seen(), np.array([since]))
+    found = new_share(_agent(), _seen(), np.array([since]))
 
     assert found == pytest.approx([share], rel=0.1)
 
@@ -81,8 +79,8 @@ def test_the_variance_when_a_landmark_was_placed_is_that_of_the_path() -> None:
 def test_a_landmark_of_no_weight_leaves_all_samples_as_likely() -> None:
     density = compare(_agent(), _seen()).density
 
-    weighted = log_likelihood(density, CONFIG.outlier_share)
-    weightless = log_likelihood(density, CONFIG.outlier_share, np.zeros(1))
+    weighted = log_likelihood(density)
+    weightless = log_likelihood(density, np.zeros(1))
 
     assert np.ptp(weighted) > 1.0
     assert np.ptp(weightless) == 0.0

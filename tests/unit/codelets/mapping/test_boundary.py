@@ -16,7 +16,7 @@ from cogmap.graph.window import EVIDENCE_COLUMNS, WEIGHT_COLUMNS
 from cogmap.runtime.codelet import CycleContext
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Cells, Operation
-from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn
+from cogmap.schemas.nodes import ROOT_MAP, Map, Misfits, PlaceColumn
 from cogmap.schemas.sensing import RangeScan
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.mapping import boundary
@@ -166,7 +166,7 @@ def test_what_is_far_or_seen_from_an_unsure_pose_counts_less() -> None:
 
 
 def test_what_lies_beyond_reach_is_not_believed() -> None:
-    beyond_m = [(x_m + CONFIG.boundary_reach_m, y_m) for x_m, y_m in ACROSS_M]
+    beyond_m = [(x_m + boundary.REACH_M, y_m) for x_m, y_m in ACROSS_M]
     graph = _seen(View(boundary_m=beyond_m))
 
     assert not list(graph.places.of_map(ROOT_MAP))
@@ -185,7 +185,7 @@ def test_views_that_change_nothing_any_more_write_nothing() -> None:
 
 
 def test_an_agent_that_is_lost_cuts_nothing() -> None:
-    lost = graph_of(msgspec.structs.replace(self_at(HERE), is_lost=True))
+    lost = graph_of(msgspec.structs.replace(self_at(HERE), misfits=Misfits(is_lost=True)))
 
     assert not run(BLOCKED.task(BOUNDARY), lost, CONFIG).operations
 
@@ -236,4 +236,4 @@ def test_the_cells_that_are_written_lie_within_reach() -> None:
     for operation in operations:
         assert isinstance(operation, Cells)
         farthest = np.abs(operation.cells.numpy()).max()
-        assert farthest <= CONFIG.boundary_reach_m + 2
+        assert farthest <= boundary.REACH_M + 2

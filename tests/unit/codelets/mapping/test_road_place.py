@@ -10,7 +10,7 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.schemas.graph import Cells
-from cogmap.schemas.nodes import ROOT_MAP, PlaceColumn
+from cogmap.schemas.nodes import ROOT_MAP, Misfits, PlaceColumn
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.mapping.road_place import ROAD_REACH_M
 from cogmap.testing import graph_of, task
@@ -93,7 +93,7 @@ def test_road_stays_where_nothing_is_seen_of_its_ground() -> None:
 
 
 def test_an_agent_that_is_lost_marks_no_road() -> None:
-    lost = graph_of(msgspec.structs.replace(self_at(ORIGIN), is_lost=True))
+    lost = graph_of(msgspec.structs.replace(self_at(ORIGIN), misfits=Misfits(is_lost=True)))
 
     assert not _road(_seen(SURE, graph=lost))
 

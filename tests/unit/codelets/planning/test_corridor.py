@@ -55,10 +55,7 @@ def _city(*goals: Goal, wall: slice | None = None) -> Graph:
 
     graph = graph_of(agent(x_m=3.0, y_m=3.0), *goals)
     graph.change([_column(PlaceColumn.ROAD, is_road), _column(PlaceColumn.OBSTACLE, stands)])
-    config = coarse_places.Config()
-    for number in range(8):
-        asked = msgspec.structs.replace(task("coarse_places"), cycle=number * config.every_cycles)
-        graph.change(coarse_places.run(asked, graph, config).operations)
+    coarse_places.make_all(graph)
     return graph
 
 

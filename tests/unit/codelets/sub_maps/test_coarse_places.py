@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
-
 import msgspec
 import numpy as np
 
 from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import NoSettings
+from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Cells, Operation
 from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn, coarse_map_id
-from cogmap.services.codelets.sub_maps.coarse_places import Config, run
-from cogmap.testing import agent, cells, graph_of, task
+from cogmap.services.codelets.sub_maps.coarse_places import EVERY_CYCLES, run
+from cogmap.testing import agent, graph_of, task
 
-CONFIG = Config()
+CONFIG = NoSettings()
 FINER, COARSEST = coarse_map_id(1), coarse_map_id(2)
 
 
@@ -21,8 +21,10 @@ def _cells(
     column: PlaceColumn, i: tuple[int, int], j: tuple[int, int], value: float = 1.0
 ) -> Cells:
     """A value of a rectangle of the root map's cells: from and to i, from and to j."""
-    rectangle = itertools.product(range(i[0], i[1] + 1), range(j[0], j[1] + 1))
-    return cells(column, dict.fromkeys(rectangle, value))
+    grid = np.mgrid[i[0] : i[1] + 1, j[0] : j[1] + 1]
+    cells = grid.reshape(2, -1).T
+    values = np.full(len(cells), value, np.float32)
+    return Cells(column=column, cells=Array.of(cells, "<i4"), values=Array.of(values))
 
 
 def _coarsened(*operations: Operation, updates: int = 1) -> Graph:
@@ -30,7 +32,7 @@ def _coarsened(*operations: Operation, updates: int = 1) -> Graph:
     graph = graph_of(agent(), *operations)
     asked = task("coarse_places")
     for number in range(updates + 1):
-        each = msgspec.structs.replace(asked, cycle=number * CONFIG.every_cycles)
+        each = msgspec.structs.replace(asked, cycle=number * EVERY_CYCLES)
         graph.change(run(each, graph, CONFIG).operations)
     return graph
 

@@ -10,7 +10,7 @@ from cogmap.schemas.graph import Cells, Delta, DropNode, Links, Phase
 from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, Object, PlaceColumn, map_id
 from cogmap.services.codelets.config import Config as WorkerConfig
 from cogmap.services.codelets.sub_maps.config import Config
-from cogmap.services.codelets.sub_maps.map_structure import MANY, due
+from cogmap.services.codelets.sub_maps.map_structure import ALL_ANEW_FROM, due
 from cogmap.testing import graph_of, landmark, percept, percepts, task
 from tests.support.world.scenes import run
 
@@ -172,7 +172,7 @@ def test_an_object_that_was_given_need_not_be_seen():
 
 
 def test_many_objects_that_come_at_once_are_all_sorted():
-    graph = graph_of(*row_of("given", MANY + 1, sightings=0))
+    graph = graph_of(*row_of("given", ALL_ANEW_FROM + 1, sightings=0))
 
     (asked,) = due(context(graph), graph, CONFIG)
 

@@ -8,17 +8,17 @@ import pytest
 
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import Extent
-from cogmap.runtime.codelet import CycleContext
+from cogmap.runtime.codelet import CycleContext, NoSettings
 from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import Cells, Operation
 from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn, map_id
 from cogmap.services.codelets.sub_maps.resampling import COLUMNS
 from cogmap.services.codelets.sub_maps.sub_map_grid import BLOCK, SETTLED_CYCLES
-from cogmap.services.codelets.sub_maps.sub_map_places import Config, due, make_all, run
+from cogmap.services.codelets.sub_maps.sub_map_places import EVERY_CYCLES, due, make_all, run
 from cogmap.testing import agent, graph_of, percepts, task
 
-CONFIG = Config()
+CONFIG = NoSettings()
 SETTLED = 1000
 HERE, FAR = map_id(1), map_id(2)
 
@@ -37,7 +37,7 @@ def _map(identifier: str = HERE, **facts: float) -> Map:
 
 
 def _task(number: int = 0) -> Task:
-    cycle = SETTLED + number * CONFIG.every_cycles
+    cycle = SETTLED + number * EVERY_CYCLES
     return msgspec.structs.replace(task("sub_map_places"), cycle=cycle)
 
 
@@ -89,7 +89,7 @@ def test_places_of_a_sub_map_that_was_moved_and_turned_stay_where_they_are_in_it
 def test_what_has_changed_around_the_agent_is_up_to_date_at_once() -> None:
     graph = _updated(_map(), _map(FAR, x_m=500.0), updates=1)
     graph.change([_road((6, 6), (0, 0))])
-    odd = next(number for number in range(2) if _task(number).cycle // CONFIG.every_cycles % 2)
+    odd = next(number for number in range(2) if _task(number).cycle // EVERY_CYCLES % 2)
     graph.change(run(_task(odd), graph, CONFIG).operations)
 
     assert _value(graph, 3, 0) == 1.0
@@ -144,10 +144,10 @@ def test_a_task_is_due_once_in_a_while_where_a_sub_map_has_settled() -> None:
         graph = graph_of(agent(), *nodes)
         contexts = (
             CycleContext(cycle, percepts(1), Array.of(np.zeros((0, 5))), graph.version)
-            for cycle in range(SETTLED, SETTLED + 2 * CONFIG.every_cycles)
+            for cycle in range(SETTLED, SETTLED + 2 * EVERY_CYCLES)
         )
         return [context.cycle for context in contexts if due(context, graph, CONFIG)]
 
     first, second = cycles(_map())
-    assert second - first == CONFIG.every_cycles
+    assert second - first == EVERY_CYCLES
     assert cycles() == cycles(_map(cycle=SETTLED)) == []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -23,6 +24,7 @@ from cogmap.schemas.nodes import (
     Correction,
     CorrectionColumn,
     Map,
+    Misfits,
     Object,
     PathColumn,
     PathSegment,
@@ -60,7 +62,7 @@ TOWN = (INN, MILL)
 class Mind:
     """Long-term memory in real time, and what the workspace publishes for it."""
 
-    def __init__(self, *objects: Object, settings: Config = CONFIG, **facts: float) -> None:
+    def __init__(self, *objects: Object, settings: Config = CONFIG, **facts: Any) -> None:
         self.graph = Graph()
         self.module = build(settings, "memory")
         self.published: list[Message] = []
@@ -201,7 +203,7 @@ def test_a_forgotten_object_comes_back_when_the_agent_returns() -> None:
 
 
 def test_an_agent_that_is_lost_is_reminded_by_what_is_conscious_alone() -> None:
-    mind = Mind(*TOWN, is_lost=True)
+    mind = Mind(*TOWN, misfits=Misfits(is_lost=True))
     mind.forget("inn")
     assert mind.offered == []
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cogmap.errors import LogError, UsageError
+from cogmap.errors import UsageError
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import Odometry, Pose, TruePose
 from cogmap.testing import odometry
@@ -105,5 +105,5 @@ def test_a_map_that_cannot_be_written_is_one_sentence(drive: Path, tmp_path: Pat
 
     with pytest.raises(UsageError, match=r"name a file that ends in \.png or \.pdf"):
         log_command("map", drive, "-o", "town.txt")
-    with pytest.raises(LogError, match="name a file in a folder that can be written to"):
+    with pytest.raises(UsageError, match="make it first"):
         log_command("map", drive, "-o", absent / "town.png")

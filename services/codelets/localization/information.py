@@ -14,17 +14,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import NEVER_NS, Object, PathColumn, PathSegment, object_id
 from cogmap.services.codelets.localization.measurement_model import Sighting
-from cogmap.services.codelets.localization.sampling import Samples, centred
+from cogmap.services.codelets.localization.sampling import centred
 
 VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
 STAMP_FORMAT = struct.Struct("<d")
 STAMP_OFFSET = PathColumn.STAMP_S * STAMP_FORMAT.size
 
 
-def novelty(samples: Samples, seen: Sighting, since: Samples) -> Samples:
+def new_share(samples: Floats, seen: Sighting, since: Floats) -> Floats:
     """(k,): the share, 0 to 1, of the uncertainty of (n, 7) samples' position that came since each
     landmark was placed: `since` (k, 2), by path integration's variances in m^2 and rad^2.
     """
@@ -34,11 +35,11 @@ def novelty(samples: Samples, seen: Sighting, since: Samples) -> Samples:
 
     since_m2, since_rad2 = since.T
     by_turns_m2 = since_rad2 * seen.range_m**2
-    share: Samples = (2 * since_m2 + by_turns_m2) / position_m2
+    share: Floats = (2 * since_m2 + by_turns_m2) / position_m2
     return share.clip(0.0, 1.0)
 
 
-def variances_when_placed(graph: Graph, seen: Sighting) -> Samples:
+def variances_when_placed(graph: Graph, seen: Sighting) -> Floats:
     """(k, 2): path integration's variances at which each landmark in view was placed."""
     path = graph.path
     variances = []
@@ -66,6 +67,8 @@ def variances_at(path: Sequence[PathSegment], stamp_ns: int) -> tuple[float, flo
 
 
 def _begin_s(segment: PathSegment) -> float:
-    """The stamp of a path segment's first place."""
+    """The stamp of a path segment's first place, without decoding the rows: most of a search's
+    time.
+    """
     (begin_s,) = STAMP_FORMAT.unpack_from(segment.rows.data, STAMP_OFFSET)
     return float(begin_s)

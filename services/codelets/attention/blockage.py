@@ -1,5 +1,5 @@
-"""Road that the plan counted on, or that the agent drove over, and that is closed now: a prediction
-that fails. The rays of the range scan along it should pass, and end across it.
+"""Road that the plan leads along, or that the agent drove over, and that is blocked now: a
+prediction that fails. The rays of the range scan along it should pass, and end across it.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from cogmap.services.codelets.attention.lanes import Lane, lanes
 # before.
 FARTHEST_M = 35.0
 NEAREST_M = 4.0
-# Nobody sees whether a lane is closed that lies aslant.
-LARGEST_SLANT_RAD = math.pi / 4
+# A lane that lies more aslant is seen from too far aside to tell if it is blocked.
+MAX_SLANT_RAD = math.pi / 4
 # Rays count that pass within so far of the middle of the lane. What they hit may be seen as far
 # from the place before and behind it, and on both sides reaches at least so far across.
 HALF_WIDTH_M = 2.5
@@ -30,28 +30,28 @@ ALONG_SHARE = 0.04
 SPAN_M = 1.5
 MIN_RAYS = 2
 ENDING_SHARE = 0.75
-# What is found so near to where a street was closed is the same closure.
+# What is found so near to where a street was blocked is the same blockage.
 SAME_M = 12.0
 
 
-def closed_places(scan: Array, agent: Self, graph: Graph) -> list[str]:
+def blocked_places(scan: Array, agent: Self, graph: Graph) -> list[str]:
     """The ids of the place nodes at which rays of a scan end across a lane that the agent counts
     on: the nearest of the plan's route, and the nearest of where it drove.
     """
     rays = np.asarray(scan.numpy(), np.float64)
     cell_m = graph.cell_m(agent.map)
-    closed = []
+    blocked = []
     for lane in lanes(agent, graph):
         near = _in_sight(lane, agent)
-        places_m = near.position_m[_is_closed(near, rays, agent)]
+        places_m = near.position_m[_is_blocked(near, rays, agent)]
         for x_m, y_m in places_m[:1].tolist():
-            closed.append(place_id(round(x_m / cell_m), round(y_m / cell_m), agent.map))
+            blocked.append(place_id(round(x_m / cell_m), round(y_m / cell_m), agent.map))
 
-    return closed
+    return blocked
 
 
 def expected_by(place: str, graph: Graph) -> str:
-    """The id of what counted on a place node that is closed: the plan, if its route leads past
+    """The id of what counted on a place node that is blocked: the plan, if its route leads past
     there, else the agent, which drove there.
     """
     plan = graph.get(Plan, PLAN_ID)
@@ -65,9 +65,13 @@ def expected_by(place: str, graph: Graph) -> str:
 
 
 def is_known(place: str, noted: Mapping[str, int], since_cycle: int, cell_m: float) -> bool:
-    """Whether a place node is near one that was noted, by its id, in `since_cycle` or later."""
+    """If a place node is near one that was noted, by its id, in `since_cycle` or later."""
+    here = place_cell(place)
     for known, cycle in noted.items():
-        if cycle >= since_cycle and _away_m(place, known, cell_m) <= SAME_M:
+        there = place_cell(known)
+        if here is None or there is None or here[0] != there[0] or cycle < since_cycle:
+            continue
+        if math.dist(here[1:], there[1:]) * cell_m <= SAME_M:
             return True
 
     return False
@@ -76,31 +80,42 @@ def is_known(place: str, noted: Mapping[str, int], since_cycle: int, cell_m: flo
 def _in_sight(lane: Lane, agent: Self) -> Lane:
     """The places of a lane, the nearest first, that the agent looks along from not too far."""
     away_m, slant_rad, _ = _as_seen(lane, agent)
-    is_in_sight = (away_m >= NEAREST_M) & (away_m <= FARTHEST_M) & (slant_rad <= LARGEST_SLANT_RAD)
+    is_in_sight = (away_m >= NEAREST_M) & (away_m <= FARTHEST_M) & (slant_rad <= MAX_SLANT_RAD)
 
     seen = lane.where(is_in_sight)
     order = np.argsort(away_m[is_in_sight], kind="stable")
     return Lane(seen.position_m[order], seen.heading_rad[order])
 
 
-def _is_closed(lane: Lane, rays: Floats, agent: Self) -> Booleans:
+def _is_blocked(lane: Lane, rays: Floats, agent: Self) -> Booleans:
     """(n,): the places at which most of the rays (k, 2), bearing and range each, that lead there
     end, across the lane.
     """
-    leads_there = _leads_there(lane, rays, agent)
-    along_m, across_m = _in_lane(_ends_m(rays, agent), lane)
-    away_m, _, _ = _as_seen(lane, agent)
+    bearing_rad, range_m = rays.T
+    away_m, slant_rad, lane_rad = _as_seen(lane, agent)
+    half_rad = np.arctan2(HALF_WIDTH_M * np.cos(slant_rad), away_m)
+    leads_there = np.abs(wrap_angle(bearing_rad - lane_rad[:, None])) <= half_rad[:, None]
+
+    # Where rays end, along and across the lane from each of its places, (n, k).
+    ahead = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=-1)
+    eye = np.array([agent.x_m, agent.y_m, agent.heading_rad])
+    ends_m = transform_from(eye, range_m[:, None] * ahead)
+    offset_m = ends_m - lane.position_m[:, None]
+    cos = np.cos(lane.heading_rad)[:, None]
+    sin = np.sin(lane.heading_rad)[:, None]
+    along_m = offset_m[..., 0] * cos + offset_m[..., 1] * sin
+    across_m = offset_m[..., 1] * cos - offset_m[..., 0] * sin
 
     is_near = np.abs(along_m) <= (ALONG_M + ALONG_SHARE * away_m)[:, None]
-    has_ended = rays[:, 1] > 0
+    has_ended = range_m > 0
     ends_there = leads_there & has_ended & is_near & (np.abs(across_m) <= HALF_WIDTH_M)
 
     number = ends_there.sum(axis=1)
     is_most = number >= np.maximum(MIN_RAYS, ENDING_SHARE * leads_there.sum(axis=1))
     leftmost_m = np.where(ends_there, across_m, -np.inf).max(axis=1, initial=-np.inf)
     rightmost_m = np.where(ends_there, across_m, np.inf).min(axis=1, initial=np.inf)
-    is_closed: Booleans = is_most & (leftmost_m - rightmost_m >= SPAN_M)
-    return is_closed
+    is_blocked: Booleans = is_most & (leftmost_m - rightmost_m >= SPAN_M)
+    return is_blocked
 
 
 def _as_seen(lane: Lane, agent: Self) -> tuple[Floats, Floats, Floats]:
@@ -111,41 +126,3 @@ def _as_seen(lane: Lane, agent: Self) -> tuple[Floats, Floats, Floats]:
     direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
     slant_rad = np.arccos(np.abs(np.cos(direction_rad - lane.heading_rad)))
     return np.hypot(*offset_m.T), slant_rad, direction_rad - agent.heading_rad
-
-
-def _leads_there(lane: Lane, rays: Floats, agent: Self) -> Booleans:
-    """(n, k): which of the rays lead to each place of a lane."""
-    away_m, slant_rad, bearing_rad = _as_seen(lane, agent)
-    half_rad = np.arctan2(HALF_WIDTH_M * np.cos(slant_rad), away_m)
-    aside_rad = wrap_angle(rays[:, 0] - bearing_rad[:, None])
-    leads_there: Booleans = np.abs(aside_rad) <= half_rad[:, None]
-    return leads_there
-
-
-def _ends_m(rays: Floats, agent: Self) -> Floats:
-    """(k, 2): where rays end on the map."""
-    bearing_rad, range_m = rays.T
-    ahead = np.stack([np.cos(bearing_rad), np.sin(bearing_rad)], axis=-1)
-    eye = np.array([agent.x_m, agent.y_m, agent.heading_rad])
-    return transform_from(eye, range_m[:, None] * ahead)
-
-
-def _in_lane(points_m: Floats, lane: Lane) -> tuple[Floats, Floats]:
-    """(n, k) each: how far along and across a lane from each of its n places (k, 2) points are."""
-    offset_m = points_m - lane.position_m[:, None]
-    cos = np.cos(lane.heading_rad)[:, None]
-    sin = np.sin(lane.heading_rad)[:, None]
-
-    along_m = offset_m[..., 0] * cos + offset_m[..., 1] * sin
-    across_m = offset_m[..., 1] * cos - offset_m[..., 0] * sin
-    return along_m, across_m
-
-
-def _away_m(place: str, other: str, cell_m: float) -> float:
-    """How far apart two place nodes are; infinite of any other nodes, or on different maps."""
-    here = place_cell(place)
-    there = place_cell(other)
-    if here is None or there is None or here[0] != there[0]:
-        return math.inf
-
-    return math.dist(here[1:], there[1:]) * cell_m

@@ -1,33 +1,34 @@
-"""`cogmap log summary` and `map`: what a run leaves, from its log alone."""
+"""`cogmap log summary` and `map`: the summary and the map of a run, from its log alone."""
 
 from __future__ import annotations
 
 import logging
 from pathlib import Path
-from typing import Any
 
 import click
 import msgspec
 from rich.console import Console
 
 from cogmap.bus.interface import Arrival
-from cogmap.cli.launch.metrics import RecordedMetrics, Recording, drive_metrics
+from cogmap.cli.files import check_picture
+from cogmap.cli.launch.drive_metrics import RecordedMetrics, Recording, drive_metrics
 from cogmap.cli.launch.tally import FOLLOWED, Tally
-from cogmap.cli.log import formatting
 from cogmap.cli.log.inspect import log_argument
-from cogmap.cli.log.progress import bar
 from cogmap.cli.options import json_option
+from cogmap.cli.printing import print_json
+from cogmap.cli.progress import bar
 from cogmap.cli.run.summary import recorded_table
-from cogmap.errors import MessageError, NoAnswerError, UsageError
+from cogmap.errors import NoAnswerError
 from cogmap.graph.graph import Graph
 from cogmap.graph.replica import Fetched, Replica
 from cogmap.recording.log import recorded_config
 from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import cannot_write
 from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.run import SECTION, Run
 from cogmap.schemas import topics
 from cogmap.schemas.graph import SnapshotRequest
-from cogmap.services import registry
+from cogmap.services.sim.config import Config as SimConfig
 
 PLOTS = (".png", ".pdf")
 _MAP_EPILOG = """\b
@@ -41,33 +42,34 @@ Examples:
 @log_argument
 @json_option
 def summary(log: Path, as_json: bool) -> None:
-    """Summarise the drive in LOG as `cogmap run` does: how far, how well it knew where it was, what
-    it learned, how fast it was and what was lost.
+    """Summarise the drive in LOG as `cogmap run` does.
+
+    Prints how far the robot drove, the errors of its position, what it learned, how long a
+    cognitive cycle took, and which messages were lost.
     """
     reader = LogReader(log)
     metrics, _ = _followed(reader)
     if as_json:
-        formatting.print_json(metrics)
+        print_json(metrics)
     else:
         Console().print(recorded_table(metrics, log))
 
 
 @click.command("map", epilog=_MAP_EPILOG)
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The file; named by LOG otherwise."
+    "-o", "--output", type=click.Path(path_type=Path), help="The picture.  [default: LOG-map.png]"
 )
 @log_argument
 def draw_map(log: Path, output: Path | None) -> None:
-    """Draw the town as it is and as the agent has come to know it by the end of LOG, as PNG or PDF.
+    """Draw the true town, and the agent's map at the end of LOG, as PNG or PDF.
 
-    It is the map.png of `cogmap run`: streets and buildings, the true path, the estimated one and
-    path integration alone, the streets and buildings that were learned.
+    The picture is the map.png of `cogmap run`: streets and buildings, the true path, the estimated
+    one and path integration alone, the streets and buildings that were learned.
     """
     from cogmap.cli.plots import map as plot  # other commands have no use for matplotlib
 
     path = output or Path(f"{log.stem}-map{PLOTS[0]}")
-    if path.suffix.lower() not in PLOTS:
-        raise UsageError(f"-o {path}: name a file that ends in {' or '.join(PLOTS)}")
+    check_picture("-o", path, PLOTS)
     metrics, tally = _followed(LogReader(log))
 
     logging.getLogger("matplotlib").setLevel(logging.WARNING)
@@ -81,44 +83,21 @@ def draw_map(log: Path, output: Path | None) -> None:
 
 
 def _followed(reader: LogReader) -> tuple[RecordedMetrics, Tally]:
-    """The metrics of the drive in a log, and what its messages amount to. Raises LogError."""
-    config = recorded_config(reader)
+    """The metrics of the drive in a log, and the tally of its messages. Raises LogError.
+
+    Warns of what the log lacks for them.
+    """
     tally = Tally(Replica(_no_snapshot, Graph()))
     intake = Intake()
     with bar(f"reading {reader.path.name}") as progress:
         for record in reader.records(FOLLOWED, progress):
             payload = reader.payload(record)
             arrival = Arrival(record.topic, payload, record.envelope, record.log_time_ns)
-            _count(arrival, intake, tally)
+            tally.receive(arrival, intake)
 
-    _warn(reader, tally)
-    metrics = drive_metrics(tally, tally.gaps(intake.gaps), tally.rejected(intake.rejected))
-    recorded = RecordedMetrics(
-        **msgspec.structs.asdict(metrics),
-        completed=metrics.progress >= 1.0,
-        seed=int(_setting(config, "sim", "seed")),
-        lockstep=bool(_setting(config, "run", "lockstep")),
-        log=Recording.read(reader.path),
-    )
-    return recorded, tally
-
-
-def _count(arrival: Arrival, intake: Intake, tally: Tally) -> None:
-    message = intake.accept(arrival)
-    if message is None or arrival.envelope is None:
-        return
-    try:
-        tally.update(message, arrival.envelope, arrival.received_ns)
-    except MessageError as error:
-        intake.reject(arrival.topic.name, str(error))
-
-
-def _warn(reader: LogReader, tally: Tally) -> None:
-    """Name what the log lacks for a summary."""
     if tally.observer.start is None:
-        click.echo(
-            f"{reader.path} holds no {topics.TRUE_POSE.name}: distances and errors are 0", err=True
-        )
+        name = topics.TRUE_POSE.name
+        click.echo(f"{reader.path} holds no {name}: distances and errors are 0", err=True)
     if tally.replica.is_behind:
         version = tally.replica.graph.version
         click.echo(
@@ -127,13 +106,18 @@ def _warn(reader: LogReader, tally: Tally) -> None:
             err=True,
         )
 
-
-def _setting(config: dict[str, dict[str, Any]], module: str, key: str) -> Any:
-    """A recorded setting, or its default where the log does not hold it."""
-    recorded = config.get(module, {})
-    if key in recorded:
-        return recorded[key]
-    return getattr(registry.config_type(module)(), key)
+    recorded = recorded_config(reader)
+    seed = recorded.get("sim", {}).get("seed", SimConfig().seed)
+    lockstep = recorded.get(SECTION, {}).get("lockstep", Run().lockstep)
+    metrics = drive_metrics(tally, tally.gaps(intake.gaps), tally.rejected(intake.rejected))
+    of_log = RecordedMetrics(
+        **msgspec.structs.asdict(metrics),
+        completed=metrics.progress >= 1.0,
+        seed=int(seed),
+        lockstep=bool(lockstep),
+        log=Recording.read(reader.path),
+    )
+    return of_log, tally
 
 
 def _no_snapshot(_request: SnapshotRequest) -> Fetched:

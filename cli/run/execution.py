@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 import msgspec
@@ -14,13 +15,13 @@ from rich.console import Console
 
 from cogmap.bus.session import check_free
 from cogmap.cli import BEGAN_S
+from cogmap.cli.launch.display import Display, display_on
 from cogmap.cli.launch.drive import Drive
 from cogmap.cli.launch.forking.client import ForkServer
 from cogmap.cli.launch.plan import CONFIG_NAME, Choices, effective
 from cogmap.cli.run import summary
 from cogmap.cli.run.checks import check_inputs
-from cogmap.cli.run.command import default_limit_s
-from cogmap.cli.run.display import Display, display_on
+from cogmap.cli.run.options import AROUND_S, LAP_LIMIT_S
 from cogmap.errors import ConfigError, StorageError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
@@ -75,6 +76,19 @@ def run_drive(start: Start, server: ForkServer | None) -> int:
     else:
         console.print(summary.table(metrics, folder))
     return ending.outcome.exit_code
+
+
+def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
+    """The time limit of a drive with these settings of the simulation.
+
+    It grows with each lap, and is one lap's at least; without laps it is the drive's duration, and
+    time to start and to end.
+    """
+    has_laps = not (choices.tour or choices.goals or choices.explore_s)
+    if sim["town"] == LOOP and has_laps:
+        return LAP_LIMIT_S * max(1.0, choices.laps or 1.0)
+
+    return float(sim["duration_s"]) + AROUND_S
 
 
 def _introduce(screen: Display, drive: Drive) -> None:

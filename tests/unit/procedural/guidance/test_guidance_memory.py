@@ -6,7 +6,7 @@ import pytest
 
 from cogmap.schemas.cognition import ActionName, Behaviour, GuidanceScheme
 from cogmap.schemas.nodes import PLAN_ID, Plan, PlanState
-from cogmap.services.procedural.guidance.memory import GuidanceMemory
+from cogmap.services.procedural.guidance.guidance_memory import GuidanceMemory
 from cogmap.services.procedural.patterns import Active
 from cogmap.testing import PERIOD_NS
 from tests.support.world.guidance import broadcast, driven, guidance, relations, selected

@@ -2,19 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import click
 import msgspec
 
-from cogmap.cli.log.formatting import megabytes, print_json, print_table
-from cogmap.cli.log.progress import bar
-from cogmap.cli.memory.source import checked, database_argument
 from cogmap.cli.options import json_option
+from cogmap.cli.printing import megabytes, print_json, print_table
+from cogmap.cli.progress import bar
+from cogmap.runtime.state.database import Database
 from cogmap.runtime.state.record import Record
 
-_COLUMNS = ["kind:", "records", "size", "newest:"]
+COLUMNS = ["kind:", "records", "size", "newest:"]
+existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
+database_argument = click.argument("path", metavar="FILE", type=existing_file)
+
+
+@contextmanager
+def checked(path: Path) -> Iterator[Database]:
+    """Open the database at `path` once all of it was checked. Raises StorageError."""
+    with bar(f"checking {path.name}") as progress:
+        database = Database(path, progress)
+
+    with closing(database):
+        yield database
 
 
 class Kind(msgspec.Struct):
@@ -32,7 +45,7 @@ class Kind(msgspec.Struct):
 
 
 class Contents(msgspec.Struct):
-    """What is in a database: of all records, and of each kind."""
+    """The contents of a database: all records together, and each kind."""
 
     path: str
     file_bytes: int
@@ -44,7 +57,7 @@ class Contents(msgspec.Struct):
 @database_argument
 @json_option
 def show(path: Path, as_json: bool) -> None:
-    """Show what is in FILE: of each kind how many records, their size, and the newest."""
+    """Show the number and size of the records of each kind in FILE, and the newest of them."""
     with checked(path) as database, bar(f"reading {path.name}") as progress:
         found = Contents(str(path), path.stat().st_size, Kind(), {})
         for record in database.records():
@@ -54,24 +67,20 @@ def show(path: Path, as_json: bool) -> None:
 
     if as_json:
         print_json(found)
-    else:
-        _print(found)
+        return
+
+    click.echo(f"{path}: {found.all.records} records, {megabytes(found.file_bytes)}")
+    if found.all.records:
+        rows = [
+            (name, kind.records, megabytes(kind.payload_bytes), kind.newest)
+            for name, kind in sorted(found.kinds.items())
+        ]
+        print_table(COLUMNS, rows)
 
 
 @click.command()
 @database_argument
 def check(path: Path) -> None:
-    """Check every page and every record of FILE; exit code 2 where one is damaged."""
+    """Check every page and every record of FILE; ends with 2 if one is damaged."""
     with checked(path) as database:
         click.echo(f"{path}: {database.count} records, none damaged")
-
-
-def _print(found: Contents) -> None:
-    click.echo(f"{found.path}: {found.all.records} records, {megabytes(found.file_bytes)}")
-    if found.all.records:
-        print_table(_COLUMNS, list(_rows(found.kinds)))
-
-
-def _rows(kinds: dict[str, Kind]) -> Iterable[list[str]]:
-    for name, kind in sorted(kinds.items()):
-        yield [name, str(kind.records), megabytes(kind.payload_bytes), kind.newest]

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from cogmap.cli.explain import names, reasons, text
-from cogmap.cli.explain.moment import Moment
-from cogmap.cli.plots.moment.blocks import Bar, Block, Words
-from cogmap.cli.plots.moment.box import (
+from cogmap.cli.explain.drawing.blocks import Bar, Block, Words
+from cogmap.cli.explain.drawing.box import (
     BETWEEN,
     LARGE,
     MOST,
@@ -18,8 +17,9 @@ from cogmap.cli.plots.moment.box import (
     note,
     others,
 )
-from cogmap.cli.plots.moment.lettering import shortened, wrapped
-from cogmap.cli.plots.moment.robot import Robot
+from cogmap.cli.explain.drawing.lettering import shortened, wrapped
+from cogmap.cli.explain.drawing.robot import Robot
+from cogmap.cli.explain.moment import Moment
 from cogmap.cli.plots.palette import ESTIMATE, FAINT, PLAN, TRUE, WALL, WHEELS
 from cogmap.schemas.cognition import Behaviour, Coalition, Contender, Fate, Rejection
 

@@ -16,19 +16,27 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
 from cogmap.schemas import nodes
-from cogmap.schemas.cognition import Broadcast, Coalition
+from cogmap.schemas.cognition import Broadcast
 from cogmap.schemas.graph import Delta
 from cogmap.schemas.memory import Stored, StoredRecord
 from cogmap.schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Recollection, Self, episode_id
-from cogmap.services.memory.changes import Changes
 from cogmap.services.memory.config import Config
 from cogmap.services.memory.episodic.corrections import Corrections, Shift
 from cogmap.services.memory.episodic.cues import EpisodicCues
 from cogmap.services.memory.episodic.episodes import Episodes, KeptEpisode, is_episode
 from cogmap.services.memory.episodic.visit import Position, Visit
+from cogmap.services.memory.storing import Changes
 
 PATH = 3
 """So many places before that of an episode belong to it."""
+
+LEARNING_RATE = 0.02
+"""What a further broadcast adds to an episode's activation, times that of the coalition."""
+
+MIN_MATCH = 0.3
+"""How well an episode must match what is conscious to be recalled: half of the content at one place
+is 0.35, and what is unrelated 0.
+"""
 
 
 class EpisodicMemory:
@@ -149,56 +157,50 @@ class EpisodicMemory:
             return None
 
         if self._cues is None:
-            self._cues = EpisodicCues(self._sparse, self._config.place_m)
+            self._cues = EpisodicCues(self._sparse)
         self._cues.hold(ended)
 
         def is_wanted(number: int) -> bool:
-            return self._is_past(ended[number], now_ns)
+            episode = ended[number]
+            ago_ns = now_ns - episode.until_ns
+            return episode.run != self._run or ago_ns >= self._config.recall_after_s * 1e9
 
         found = self._cues.recalled(visit.episode(self._run, self._map), is_wanted)
-        if found is None or found.match < self._config.min_match:
+        if found is None or found.match < MIN_MATCH:
             return None
         return _node(ended[found.number], found.match)
-
-    def _is_past(self, episode: KeptEpisode, now_ns: int) -> bool:
-        """Whether an episode is long enough ago."""
-        ago_ns = now_ns - episode.until_ns
-        return episode.run != self._run or ago_ns >= self._config.recall_after_s * 1e9
 
     def _take(self, broadcast: Broadcast) -> None:
         """Let a broadcast be part of the episode that lasts, or begin the next one."""
         coalition = broadcast.coalition
-        amount = self._config.learning_rate * coalition.activation
+        amount = LEARNING_RATE * coalition.activation
         for node in coalition.nodes:
             if isinstance(node, nodes.Episode):
                 self._episodes.reinforce(node.number, amount, broadcast.stamp_ns)
 
-        agent = _agent_in(coalition)
-        if agent is None or agent.map != ROOT_MAP or agent.is_lost:
+        agent = next((node for node in coalition.nodes if isinstance(node, Self)), None)
+        if agent is None or agent.map != ROOT_MAP or agent.misfits.is_lost:
             return
 
         at_m = (agent.x_m, agent.y_m)
-        if self._visits and self._visits[-1].goes_on(at_m, self._config.place_m):
+        if self._visits and self._visits[-1].includes(at_m):
             self._visits[-1].reinforce(amount)
         else:
-            self._begin(broadcast, at_m)
+            path: list[Position] = []
+            if self._visits:
+                before = self._visits[-1]
+                path = [before.at_m, *before.path][:PATH]
+
+            visit = Visit(
+                number=self._episodes.next_number(),
+                at_m=at_m,
+                path=path,
+                from_ns=broadcast.stamp_ns,
+                until_ns=broadcast.stamp_ns,
+                activation=coalition.activation,
+            )
+            self._visits.append(visit)
         self._visits[-1].add(broadcast)
-
-    def _begin(self, broadcast: Broadcast, at_m: Position) -> None:
-        path: list[Position] = []
-        if self._visits:
-            before = self._visits[-1]
-            path = [before.at_m, *before.path][:PATH]
-
-        visit = Visit(
-            number=self._episodes.next_number(),
-            at_m=at_m,
-            path=path,
-            from_ns=broadcast.stamp_ns,
-            until_ns=broadcast.stamp_ns,
-            activation=broadcast.coalition.activation,
-        )
-        self._visits.append(visit)
 
     def _correct(self, rows: Floats) -> None:
         """Move the places of the root map's episodes as a correction, (n, 7), states."""
@@ -247,12 +249,6 @@ class EpisodicMemory:
         for visit in self._visits:
             assert pose is not None
             visit.at_m, *visit.path = _moved(pose, [visit.at_m, *visit.path])
-
-
-def _agent_in(coalition: Coalition) -> Self | None:
-    """The agent as a coalition has it."""
-    agents = (node for node in coalition.nodes if isinstance(node, Self))
-    return next(agents, None)
 
 
 def _moved(pose: Floats, places_m: list[Position]) -> list[Position]:

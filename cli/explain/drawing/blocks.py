@@ -9,7 +9,7 @@ from typing import Protocol
 from matplotlib.axes import Axes
 from matplotlib.patches import Rectangle
 
-from cogmap.cli.plots.moment.lettering import line_in
+from cogmap.cli.explain.drawing.lettering import line_in
 from cogmap.cli.plots.palette import FAINT, INK, STREET, TRUE
 
 BAR_IN = 0.09

@@ -11,12 +11,12 @@ from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch, FancyBboxPatch, Rectangle
 
 from cogmap.cli.explain import reasons, text
+from cogmap.cli.explain.drawing import deciding, sensing
+from cogmap.cli.explain.drawing.blocks import Words
+from cogmap.cli.explain.drawing.box import LARGE, PAD_IN, Box, inner_in
+from cogmap.cli.explain.drawing.lettering import wrapped
 from cogmap.cli.explain.moment import Moment
 from cogmap.cli.plots import draw
-from cogmap.cli.plots.moment import deciding, sensing
-from cogmap.cli.plots.moment.blocks import Words
-from cogmap.cli.plots.moment.box import LARGE, PAD_IN, Box, inner_in
-from cogmap.cli.plots.moment.lettering import wrapped
 from cogmap.cli.plots.palette import FAINT, INK, KERB, PAPER, WALL
 from cogmap.recording import views
 from cogmap.recording.views import Image

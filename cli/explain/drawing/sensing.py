@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from cogmap.cli.explain import names, text
-from cogmap.cli.explain.moment import Moment
-from cogmap.cli.plots import draw
-from cogmap.cli.plots.moment.blocks import Bar, Block, Words
-from cogmap.cli.plots.moment.box import (
+from cogmap.cli.explain.drawing.blocks import Bar, Block, Words
+from cogmap.cli.explain.drawing.box import (
     BETWEEN,
     MOST,
     SMALL,
@@ -17,7 +15,9 @@ from cogmap.cli.plots.moment.box import (
     note,
     others,
 )
-from cogmap.cli.plots.moment.lettering import wrapped
+from cogmap.cli.explain.drawing.lettering import wrapped
+from cogmap.cli.explain.moment import Moment
+from cogmap.cli.plots import draw
 from cogmap.cli.plots.palette import FAINT, FUSED, OBJECT, TRUE
 from cogmap.schemas.sensing import Percept
 

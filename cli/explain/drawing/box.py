@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cogmap.cli.plots.moment.blocks import Block, Gap, Words
-from cogmap.cli.plots.moment.lettering import shortened, width_of, wrapped
+from cogmap.cli.explain.drawing.blocks import Block, Gap, Words
+from cogmap.cli.explain.drawing.lettering import shortened, width_of, wrapped
 from cogmap.cli.plots.palette import FAINT, INK
 
 PAD_IN = 0.14

@@ -1,5 +1,5 @@
-"""What an attention codelet keeps in the graph: its refractory period, and what it has still to
-make conscious.
+"""What an attention codelet keeps in the graph: its refractory period, and what is pending until it
+is conscious.
 """
 
 from __future__ import annotations
@@ -13,6 +13,11 @@ from cogmap.runtime.codelet import Answer
 from cogmap.schemas.cognition import Coalition
 from cogmap.schemas.nodes import Attention, attention_id
 
+# Cycles that a codelet waits after it has brought a coalition. LIDA's refractory period of 50
+# ticks of 5 ms ends within the second cycle of 200 ms. It is counted in cycles, for attention
+# codelets run once in each, so that a run depends on no clock.
+REFRACTORY_CYCLES = 1
+
 
 def memory_of(codelet: str, graph: Graph) -> Attention:
     """What `codelet` keeps; nothing at first."""
@@ -24,12 +29,12 @@ def memory_of(codelet: str, graph: Graph) -> Attention:
     return Attention(id=identifier, codelet=codelet, base_level=1.0)
 
 
-def is_refractory(codelet: str, graph: Graph, cycle: int, refractory_cycles: int) -> bool:
-    """Whether `codelet` has brought a coalition so lately that it waits in `cycle`."""
+def is_refractory(
+    codelet: str, graph: Graph, cycle: int, refractory_cycles: int = REFRACTORY_CYCLES
+) -> bool:
+    """If `codelet` has brought a coalition so few cycles ago that it waits in `cycle`."""
     brought = memory_of(codelet, graph).brought_cycle
-    if not brought:
-        return False
-    return cycle - brought <= refractory_cycles
+    return brought > 0 and cycle - brought <= refractory_cycles
 
 
 def without_conscious(memory: Attention) -> Attention:
@@ -57,7 +62,7 @@ def brought(memory: Attention, found: Coalition, cycle: int, graph: Graph) -> An
 
 
 def kept(memory: Attention, graph: Graph, found: Iterable[Coalition] = ()) -> Answer:
-    """Coalitions, and what the codelet keeps, where that is new."""
+    """Coalitions, and what the codelet keeps, if that is new."""
     answer = Answer(coalitions=list(found))
     if memory != graph.nodes.get(memory.id):
         answer.operations.append(memory)

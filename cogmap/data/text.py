@@ -1,0 +1,86 @@
+"""Text files of a user, line by line: plain or packed by gzip, bzip2 or xz, in UTF-8 or Latin-1."""
+
+from __future__ import annotations
+
+import bz2
+import codecs
+import gzip
+import lzma
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, NamedTuple, cast
+
+from cogmap.errors import UsageError
+
+PACKED = ("", ".gz", ".bz2", ".xz")
+MAX_SHOWN = 60
+# A packed file is known by its first bytes: names may be wrong.
+_OPENERS: dict[bytes, Callable[[Path], object]] = {
+    b"\x1f\x8b": gzip.open,
+    b"BZh": bz2.open,
+    b"\xfd7zXZ\x00": lzma.open,
+}
+
+
+class Line(NamedTuple):
+    """A line of a file without its end, and its number, counted from 1."""
+
+    path: Path
+    number: int
+    text: str
+
+    def wrong(self, expected: str, remedy: str = "") -> UsageError:
+        """Make the error for a line that is not as `expected`; `remedy` is what to do about it."""
+        shown = self.text.strip()
+        if len(shown) > MAX_SHOWN:
+            shown = f"{shown[:MAX_SHOWN]}…"
+
+        sentence = f"{self.path}, line {self.number}: expected {expected}, got '{shown}'"
+        return UsageError(f"{sentence}: {remedy}" if remedy else sentence)
+
+
+def numbered_lines(path: Path, give: str) -> Iterator[Line]:
+    """Yield the lines of a file, unpacked, without a byte-order mark.
+
+    Raises UsageError if it cannot be read, with the remedy to give `give`.
+    """
+    with _opened(path, give) as file:
+        for number, line in enumerate(file, start=1):
+            content = line.removeprefix(codecs.BOM_UTF8) if number == 1 else line
+            try:
+                text = content.decode()
+            except UnicodeDecodeError:
+                text = content.decode("latin-1")
+            yield Line(path, number, text.rstrip("\r\n"))
+
+
+def read_bytes(path: Path, give: str) -> bytes:
+    """Return the content of a file, unpacked. Raises UsageError as `numbered_lines` does."""
+    with _opened(path, give) as file:
+        return file.read()
+
+
+def plain_or_packed(folder: Path, name: str) -> Path | None:
+    """Find a file by its name in a folder, plain or packed; None if there is none."""
+    for suffix in PACKED:
+        path = folder / f"{name}{suffix}"
+        if path.is_file():
+            return path
+    return None
+
+
+@contextmanager
+def _opened(path: Path, give: str) -> Iterator[IO[bytes]]:
+    try:
+        with path.open("rb") as plain:
+            beginning = plain.read(max(map(len, _OPENERS)))
+
+        opener = next((of for magic, of in _OPENERS.items() if beginning.startswith(magic)), None)
+        with cast("IO[bytes]", opener(path) if opener else path.open("rb")) as file:
+            yield file
+    except FileNotFoundError:
+        raise UsageError(f"there is no file {path}: give {give}") from None
+    except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
+        raise UsageError(f"{path} cannot be read ({error}): give {give}, all of it") from error
