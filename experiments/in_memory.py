@@ -10,7 +10,7 @@ from cogmap.runtime.module import Module
 
 
 def run(modules: Iterable[Module]) -> None:
-    """Run them until no message is left. Raises CogmapError where one was refused."""
+    """Run them until no message is left. Raises CogmapError if one was refused."""
     runner = InProcessRunner(modules)
 
     try:

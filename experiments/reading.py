@@ -27,8 +27,8 @@ Pose = tuple[float, float, float]
 
 
 def self_pose(graph: Graph) -> Pose:
-    """Where the agent believes that it is: x_m, y_m, heading_rad. Raises CogmapError before the
-    first cycle.
+    """Return where the agent believes that it is: x_m, y_m, heading_rad. Raises CogmapError before
+    the first cycle.
     """
     agent = graph.agent
     if agent is None:
@@ -54,7 +54,7 @@ def object_positions_m(graph: Graph, labels: Sequence[str]) -> Floats:
 
 
 def observations(graph: Graph) -> Sightings:
-    """All observations of landmarks, by the place of the path that they were made from."""
+    """Return all observations of landmarks, by the place of the path that they were made from."""
     stamps_s = path_rows(graph)[:, STAMP]
     return Sightings.of(graph.of_kind(Observations), stamps_s)
 

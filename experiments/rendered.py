@@ -26,9 +26,9 @@ Result = TypeVar("Result")
 
 
 def with_cameras(sections: Sections) -> Sections:
-    """The configuration of a scripted robot with cameras, from that of one without.
+    """Return the configuration of a scripted robot with cameras, from that of one without.
 
-    Its landmarks, in their order, become the buildings of the catalogue. Raises CogmapError where
+    Its landmarks, in their order, become the buildings of the catalogue. Raises CogmapError if
     they are more.
     """
     changed: dict[str, Any] = copy.deepcopy(dict(sections))
@@ -48,7 +48,7 @@ def with_cameras(sections: Sections) -> Sections:
 
 
 def named(landmarks: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """`landmarks` by names of the catalogue. Raises CogmapError where it has too few."""
+    """Return `landmarks` by names of the catalogue. Raises CogmapError if it has too few."""
     if len(landmarks) > len(CATALOGUE):
         raise CogmapError(
             f"cameras tell {len(CATALOGUE)} kinds of building apart, too few for {len(landmarks)}"
@@ -72,7 +72,7 @@ class SensorLog:
         self._progress = progress
 
     def recorder(self) -> Module:
-        """The module that records the first run."""
+        """Return the module that records the first run."""
         module = Module("sensor_log").on(topics.TRUE_POSE, self._keep_pose)
 
         for topic in _SENSED:
@@ -81,7 +81,7 @@ class SensorLog:
         return module
 
     def player(self) -> Module:
-        """The module that publishes it all again, in the place of the senses."""
+        """Return the module that publishes it all again, in the place of the senses."""
         in_order = [self._frames[stamp_ns] for stamp_ns in sorted(self._frames)]
         frames = iter(in_order)
 
@@ -111,7 +111,7 @@ def by_cameras(
     drive: Callable[[Sections, Sequence[Module]], Result],
     progress: Progress = lambda share: None,
 ) -> dict[str, Result]:
-    """What `drive` gives for each of `configured`, which differ in their `cognition` alone.
+    """Return what `drive` gives for each of `configured`, which differ in their `cognition` alone.
 
     `drive` is given a configuration and the modules to run. The first run has everything; what was
     sensed in it is replayed in the others, so that nothing is drawn or recognised twice.
@@ -121,7 +121,11 @@ def by_cameras(
 
     for name, sections in configured.items():
         rendered = with_cameras(sections)
-        modules = _replayed(sensor_log) if results else _sensing(rendered, sensor_log)
+        if results:
+            modules = [sensor_log.player()]
+        else:
+            modules = [registry.build(module, rendered) for module in ("sim", *SENSES)]
+            modules.append(sensor_log.recorder())
         modules += [registry.build(module, rendered) for module in cognition]
         results[name] = drive(rendered, modules)
 
@@ -132,12 +136,3 @@ def by_cameras(
 
     progress(1.0)
     return results
-
-
-def _sensing(rendered: Sections, sensor_log: SensorLog) -> list[Module]:
-    senses = [registry.build(module, rendered) for module in ("sim", *SENSES)]
-    return [*senses, sensor_log.recorder()]
-
-
-def _replayed(sensor_log: SensorLog) -> list[Module]:
-    return [sensor_log.player()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
 from cogmap.bus.codec import encode
 from cogmap.runtime.module import Module
@@ -27,32 +27,21 @@ class Transcript:
         self.messages: dict[str, list[bytes]] = {topic.name: [] for topic in self._topics}
 
     def module(self) -> Module:
-        """The module `listener`."""
+        """Build the module `listener`."""
         module = Module(NAME)
-
         for topic in self._topics:
-            module.on(topic, self._keep(topic))
 
+            def keep(message: Message, kept: list[bytes] = self.messages[topic.name]) -> None:
+                kept.append(encode(message))
+
+            module.on(topic, keep)
         return module
 
     def has_as_many_as(self, other: Transcript) -> bool:
-        """Whether it has at least as many messages of each topic."""
+        """Return if it has at least as many messages of each topic."""
         return all(len(self.messages[name]) >= len(there) for name, there in other.messages.items())
 
     def differs_from(self, other: Transcript) -> list[str]:
-        """The topics on which the bytes are others."""
-        differing = []
-
-        for name, there in other.messages.items():
-            if self.messages[name] != there:
-                differing.append(name)
-
-        return differing
-
-    def _keep(self, topic: Topic) -> Callable[[Message], None]:
-        messages = self.messages[topic.name]
-
-        def keep(message: Message) -> None:
-            messages.append(encode(message))
-
-        return keep
+        """Return the topics on which the bytes differ."""
+        theirs = other.messages
+        return [name for name in theirs if self.messages[name] != theirs[name]]

@@ -36,7 +36,7 @@ OPTIONS = (
         "folder",
         required=True,
         metavar="DIR",
-        text="A folder of the UTIAS MRCLAM sets, as published, its files packed with xz or not.",
+        text="A folder of the UTIAS MRCLAM sets, as published, its files packed or not.",
     ),
     PROCESSES,
 )

@@ -1,4 +1,6 @@
-"""Routes over a grid map that others made, for the problems that came with it."""
+"""Routes over a grid map that others made, for the problems that came with it, through the
+route-plan codelet: the one that the agent drives by.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +19,25 @@ from benchmarks.threshold import at_least, at_most
 from cogmap.cli.progress import bar
 from cogmap.data.moving_ai import Problem, read_map, read_problems
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from cogmap.services.codelets.planning.network import Cell, PlaceNetwork, grid_network
-from cogmap.services.codelets.planning.search.flat import FlatPlanner
-from cogmap.services.codelets.planning.search.hierarchy import HierarchicalPlanner
-from cogmap.services.codelets.planning.search.links import Links
-from cogmap.services.codelets.planning.search.route import NoRoute, NoRouteReason, Route
+from cogmap.graph.graph import Graph
+from cogmap.runtime.codelet import Answer, NoSettings
+from cogmap.schemas.array import Array, Matrix
+from cogmap.schemas.codelets import Task
+from cogmap.schemas.graph import Cells
+from cogmap.schemas.nodes import (
+    NEVER_NS,
+    ROOT_MAP,
+    SELF_ID,
+    Goal,
+    Map,
+    PlaceColumn,
+    Plan,
+    Self,
+    goal_id,
+)
+from cogmap.services.codelets.planning import route_plan
+from cogmap.services.codelets.planning.config import Config
+from cogmap.services.codelets.sub_maps import coarse_places
 
 THRESHOLDS = {
     "solved_share": at_least(1.0),
@@ -30,98 +46,147 @@ THRESHOLDS = {
     "hierarchical_speedup": at_least(5.0),
     "time_vs_dijkstra": at_most(1.0),
 }
-# Each route is found so often, by one planner after the other, and the least time of each counts:
-# other jobs of the machine only add to it.
+
 REPEATS = 3
-# How many cells wide and high the part of the map is that is closed, and opened again.
+"""Each route is found so often, in turn, and the least time of each counts: other jobs of the
+machine only add to it."""
+
 CLOSED_CELLS = 5
+"""So many cells wide and high is the part of the map that is closed, and opened again."""
+
+CELL_M = 2.0
+"""A cell is wider than the robot, which can pass between two others that are blocked."""
+
+AT_GOAL_M = 0.5 * CELL_M
+"""A goal is reached in its own cell."""
+
+FLAT = Config(search_places=2**31, reached_m=AT_GOAL_M)
+HIERARCHICAL = Config(search_places=0, reached_m=AT_GOAL_M)
+GOAL = goal_id("benchmark")
 T = TypeVar("T")
 
 
-class Answers(NamedTuple):
-    """What the planners answered to one problem, and how long they took, and Dijkstra's method."""
+class Outcome(NamedTuple):
+    """The lengths in cells of both routes of a problem, None if one cannot be driven; the seconds
+    that the flat one, the hierarchical one and the peer's took, (3,).
+    """
 
-    flat: Route | NoRoute
-    hierarchical: Route | NoRoute
+    flat: float | None
+    hierarchical: float | None
     took_s: Floats
 
 
-class Subject(NamedTuple):
-    """A map, the planners for it, and the same graph for scipy, all of them made before."""
-
-    is_passable: Booleans
-    flat: FlatPlanner
-    hierarchical: HierarchicalPlanner
-    peer: sparse.csr_matrix
-    links: Links
-
-    def peer_number(self, goal: Cell) -> int:
-        """The number of a cell's node for scipy."""
-        node = self.links.node(goal)
-        before = self.links.is_linked[:node]
-        return int(before.sum())
-
-
 def measure(map_path: Path, scenario_path: Path) -> Metrics:
-    """The metrics of THRESHOLDS, and the times that the ratios are of.
+    """Measure the metrics of THRESHOLDS, and the times that the ratios are of.
 
-    Raises UsageError where a file cannot be read.
+    The codelet plans on the graph as it is, from the columns of the map on: flat, on the whole map,
+    or hierarchically, on the coarse maps first. The peer does what a user would do: it makes the
+    graph of the grid's free cells, searches it by Dijkstra's method, and follows the predecessors.
+
+    Raises UsageError if a file cannot be read.
     """
     is_passable = read_map(map_path)
     problems = read_problems(scenario_path, is_passable)
-    network = grid_network(is_passable)
+    graph = _graph(is_passable)
+    build_s, _ = _timed(partial(coarse_places.make_all, graph))
 
-    flat_s, flat = _timed(partial(FlatPlanner, network))
-    hierarchical_s, hierarchical = _timed(partial(HierarchicalPlanner, network))
-    links = Links(network)
-    subject = Subject(is_passable, flat, hierarchical, _graph(links), links)
-
-    answers = _answer_all(subject, problems)
-    building = {
-        "flat_build_ms": 1e3 * flat_s,
-        "hierarchy_build_ms": 1e3 * hierarchical_s,
-        "hierarchy_update_ms": 1e3 * _update_s(network, problems[0].goal),
-    }
-    return _quality(subject, problems, answers) | _speed(answers) | building
-
-
-def _answer_all(subject: Subject, problems: Sequence[Problem]) -> list[Answers]:
-    """All answers, one problem after the other, each of them by both planners and by scipy."""
-    answers = []
+    outcomes = []
     with bar("planning routes") as progress:
         for number, problem in enumerate(problems, start=1):
-            answers.append(_answer(subject, problem))
+            outcomes.append(_outcome(graph, problem, is_passable))
             progress(number / len(problems))
 
-    return answers
+    speed = _speed(outcomes)
+    return _quality(problems, outcomes) | speed | _updating(graph, build_s)
 
 
-def _answer(subject: Subject, problem: Problem) -> Answers:
-    start, goal, _ = problem
-    goal_number = subject.peer_number(goal)
+def _graph(is_passable: Booleans) -> Graph:
+    """Make a graph whose root map has the free cells as road, obstacles elsewhere and around."""
+    is_blocked = np.pad(~is_passable, 1, constant_values=True)
+    graph = Graph()
+    graph.change([Map(id=ROOT_MAP, cell_m=CELL_M)])
+    graph.change([_column(PlaceColumn.ROAD, np.argwhere(is_passable), 1.0)])
+    graph.change([_column(PlaceColumn.OBSTACLE, np.argwhere(is_blocked) - 1, 1.0)])
+    graph.change([_agent((0, 0))])
+    return graph
 
-    flat_s, flat = _fastest(partial(subject.flat.find_route, start, goal))
-    rough_s, rough = _fastest(partial(subject.hierarchical.find_route, start, goal))
-    peer_s, _ = _fastest(partial(dijkstra, subject.peer, indices=goal_number))
-    return Answers(flat, rough, np.array([flat_s, rough_s, peer_s]))
+
+def _column(column: PlaceColumn, cells: Indices, value: float) -> Cells:
+    """Set one value in a column of (n, 2) cells."""
+    values = np.full(len(cells), value, np.float32)
+    return Cells(column=column, cells=Array.of(cells, "<i4"), values=Array.of(values))
 
 
-def _quality(subject: Subject, problems: Sequence[Problem], answers: Sequence[Answers]) -> Metrics:
-    """How many problems both planners solved, and how long their routes are."""
+def _agent(cell: tuple[int, int]) -> Self:
+    """Make an agent in the middle of a cell."""
+    x_m, y_m = CELL_M * np.array(cell)
+    pose = np.array([[x_m, y_m, 0.0]])
+    return Self(id=SELF_ID, activation=1.0, x_m=x_m, y_m=y_m, samples=Matrix.of(pose))
+
+
+def _outcome(graph: Graph, problem: Problem, is_passable: Booleans) -> Outcome:
+    """Find the routes of one problem by the codelet, both ways, and by the peer."""
+    x_m, y_m = CELL_M * np.array(problem.goal)
+    goal = Goal(id=GOAL, base_level=1.0, x_m=x_m, y_m=y_m)
+    graph.change([_agent(problem.start), goal])
+    task = Task(task_id="0/route_plan", codelet="route_plan", cycle=0, version=0)
+
+    took_s = np.full(3, np.inf)
+    for _ in range(REPEATS):
+        flat_s, flat = _timed(partial(route_plan.run, task, graph, FLAT))
+        hierarchical_s, hierarchical = _timed(partial(route_plan.run, task, graph, HIERARCHICAL))
+        peer_s, _ = _timed(partial(_peer, is_passable, problem))
+        took_s = np.minimum(took_s, [flat_s, hierarchical_s, peer_s])
+
+    return Outcome(
+        flat=_length(flat, problem, is_passable),
+        hierarchical=_length(hierarchical, problem, is_passable),
+        took_s=took_s,
+    )
+
+
+def _peer(is_passable: Booleans, problem: Problem) -> Indices:
+    """Find the cheapest route as a user of scipy would, (n,) numbers of cells."""
+    _, height = is_passable.shape
+    padded = np.pad(is_passable, 1)
+    number = np.arange(is_passable.size).reshape(is_passable.shape)
+    rows = []
+    columns = []
+    lengths = []
+    for di, dj in ((1, 0), (0, 1), (1, 1), (-1, 1)):
+        beyond = np.roll(padded, (-di, -dj), (0, 1))
+        beside_i = np.roll(padded, -di, 0)
+        beside_j = np.roll(padded, -dj, 1)
+        is_open = (padded & beyond & beside_i & beside_j)[1:-1, 1:-1]
+        rows.append(number[is_open])
+        columns.append(number[is_open] + di * height + dj)
+        lengths.append(np.full(int(is_open.sum()), np.hypot(di, dj)))
+
+    entries = (np.concatenate(lengths), (np.concatenate(rows), np.concatenate(columns)))
+    links = sparse.csr_matrix(entries, shape=(is_passable.size, is_passable.size))
+    start = int(number[problem.start])
+    goal = int(number[problem.goal])
+    _, upward = dijkstra(links, directed=False, indices=goal, return_predecessors=True)
+
+    route = [start]
+    while route[-1] != goal and upward[route[-1]] >= 0:
+        route.append(int(upward[route[-1]]))
+    return np.array(route)
+
+
+def _quality(problems: Sequence[Problem], outcomes: Sequence[Outcome]) -> Metrics:
+    """Return how many problems were solved both ways, and how long the routes are."""
     flat = []
     hierarchical = []
     solved = 0
-
-    for problem, answer in zip(problems, answers, strict=True):
-        flat_length = _length(answer.flat, problem, subject.is_passable)
-        rough_length = _length(answer.hierarchical, problem, subject.is_passable)
-        if flat_length is None or rough_length is None:
+    for problem, outcome in zip(problems, outcomes, strict=True):
+        if outcome.flat is None or outcome.hierarchical is None:
             continue
 
         solved += 1
         if problem.optimal > 0:
-            flat.append(flat_length / problem.optimal)
-            hierarchical.append(rough_length / problem.optimal)
+            flat.append(outcome.flat / problem.optimal)
+            hierarchical.append(outcome.hierarchical / problem.optimal)
 
     return {
         "problems": float(len(problems)),
@@ -132,9 +197,9 @@ def _quality(subject: Subject, problems: Sequence[Problem], answers: Sequence[An
     }
 
 
-def _speed(answers: Sequence[Answers]) -> Metrics:
-    """The mean times, and their ratios."""
-    took_s = np.array([answer.took_s for answer in answers])
+def _speed(outcomes: Sequence[Outcome]) -> Metrics:
+    """Return the mean times, and their ratios."""
+    took_s = np.array([outcome.took_s for outcome in outcomes])
     flat_s, hierarchical_s, dijkstra_s = took_s.mean(axis=0).tolist()
     return {
         "hierarchical_speedup": flat_s / hierarchical_s,
@@ -145,23 +210,40 @@ def _speed(answers: Sequence[Answers]) -> Metrics:
     }
 
 
-def _length(answer: Route | NoRoute, problem: Problem, is_passable: Booleans) -> float | None:
-    """The length in cells of a route that can be driven, None where it cannot or there is none."""
-    if isinstance(answer, NoRoute):
-        return 0.0 if answer.reason is NoRouteReason.AT_GOAL else None
+def _updating(graph: Graph, build_s: float) -> Metrics:
+    """Return the time to make the coarse maps, and to change them if a part of the map around the
+    agent is closed.
+    """
+    agent = graph.agent
+    assert agent is not None
+    corner = np.rint(np.array([agent.x_m, agent.y_m]) / CELL_M).astype(np.int64)
+    closed = corner + np.argwhere(np.ones((CLOSED_CELLS, CLOSED_CELLS)))
+    graph.change([_column(PlaceColumn.OBSTACLE, closed, 1.0)])
 
-    cells = answer.cells
-    ends = cells[[0, -1]].tolist()
-    if ends != [list(problem.start), list(problem.goal)] or not _is_open(cells, is_passable):
-        return None
+    task = Task(task_id="0/coarse_places", codelet="coarse_places", cycle=0, version=0)
+    update_s, _ = _timed(partial(coarse_places.run, task, graph, NoSettings()))
+    return {"hierarchy_build_ms": 1e3 * build_s, "hierarchy_update_ms": 1e3 * update_s}
 
-    steps = np.diff(cells, axis=0)
-    lengths = np.hypot(steps[:, 0], steps[:, 1])
-    return float(lengths.sum())
+
+def _length(answer: Answer, problem: Problem, is_passable: Booleans) -> float | None:
+    """Return the length in cells of the route in an answer, None if it cannot be driven or there is
+    none.
+    """
+    for operation in answer.operations:
+        if isinstance(operation, Goal) and operation.reached_ns != NEVER_NS:
+            return 0.0
+        if isinstance(operation, Plan) and operation.route is not None:
+            route = operation.route.numpy() / CELL_M
+            cells = np.rint(route).astype(np.int64)
+            ends = cells[[0, -1]].tolist()
+            if ends == [list(problem.start), list(problem.goal)] and _is_open(cells, is_passable):
+                return float(np.hypot(*np.diff(route, axis=0).T).sum())
+
+    return None
 
 
 def _is_open(cells: Indices, is_passable: Booleans) -> bool:
-    """Whether (n, 2) cells are neighbours one after the other, free, and cut no corner."""
+    """Decide whether (n, 2) cells are neighbours one after the other, free, and cut no corner."""
     steps = np.diff(cells, axis=0)
     if np.abs(steps).max() > 1:
         return False
@@ -176,39 +258,8 @@ def _is_open(cells: Indices, is_passable: Booleans) -> bool:
     return bool(is_open.all())
 
 
-def _graph(links: Links) -> sparse.csr_matrix:
-    """The links that are not cut, between the nodes that have any, as scipy takes a graph."""
-    graph = links.matrix().copy()
-    graph.data[np.isinf(graph.data)] = 0
-    graph.eliminate_zeros()
-    return graph[links.is_linked][:, links.is_linked]
-
-
-def _update_s(network: PlaceNetwork, cell: Cell) -> float:
-    """The time to take a change of the map: what is about a cell is closed, and opened again."""
-    planner = HierarchicalPlanner(network)
-    i, j = cell
-    closed = network._replace(weights=network.weights.copy())
-    closed.weights[:, i : i + CLOSED_CELLS, j : j + CLOSED_CELLS] = 0
-
-    planner.update(closed)
-    opening_s, _ = _timed(partial(planner.update, network))
-    closing_s, _ = _timed(partial(planner.update, closed))
-    return max(opening_s, closing_s)
-
-
-def _fastest(work: Callable[[], T]) -> tuple[float, T]:
-    """The least seconds that `work` took of REPEATS times, and what it returned."""
-    took_s, result = _timed(work)
-    for _ in range(REPEATS - 1):
-        again_s, result = _timed(work)
-        took_s = min(took_s, again_s)
-
-    return took_s, result
-
-
 def _timed(work: Callable[[], T]) -> tuple[float, T]:
-    """The seconds that `work` took, and what it returned."""
+    """Return the seconds that `work` took, and what it returned."""
     began_s = time.perf_counter()
     result = work()
     return time.perf_counter() - began_s, result

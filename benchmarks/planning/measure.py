@@ -15,19 +15,19 @@ OPTIONS = (
         "--grid",
         "map_path",
         metavar="MAP",
-        text="A grid map of yours in the MovingAI format (.map), packed with xz or not.",
+        text="A grid map of yours in the MovingAI format (.map), packed or not.",
     ),
     path_option(
         "--scen",
         "scenario_path",
         metavar="SCEN",
-        text="Of --grid: the problems on it (.scen), packed with xz or not.",
+        text="Of --grid: the problems on it (.scen), packed or not.",
     ),
     path_option(
         "--tsp",
         "tsp_folder",
         metavar="DIR",
-        text="TSPLIB problems of yours (.tsp: EUC_2D, ATT, GEO), packed with xz or not; "
+        text="TSPLIB problems of yours (.tsp: EUC_2D, ATT, GEO), packed or not; "
         "NAME.opt.tour is taken for the optimum if it is there.",
     ),
     path_option(
@@ -35,7 +35,7 @@ OPTIONS = (
         "human_folder",
         metavar="DIR",
         text="People's tours: problems as GraphN.lib, in TSPLIB's format, and tours.csv, packed "
-        "with xz or not.",
+        "or not.",
     ),
     PROCESSES,
 )

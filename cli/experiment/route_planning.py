@@ -36,7 +36,7 @@ Examples:
     "--data",
     type=click.Path(path_type=Path),
     metavar="DIR",
-    help="People's tours: problems as GraphN.lib, in TSPLIB's format, and tours.csv, packed as .xz "
+    help="People's tours: problems as GraphN.lib, in TSPLIB's format, and tours.csv, packed "
     "or not, with the columns graph, participant, x and y.",
 )
 @click.option(

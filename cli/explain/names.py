@@ -151,11 +151,16 @@ def _plan(plan: Plan) -> str:
         return f"the plan: {plan.state.value}"
 
     length = f"{plan.length_m:.0f} m"
-    doubt = ", over doubtful road" if plan.doubtful else ""
+    doubt = ", over road that was blocked" if plan.doubtful else ""
     if plan.explores or not plan.goals:
         return f"the plan to explore, {length}{doubt}"
+
     name = spoken(plan.goals[0].removeprefix(goal_id("")))
-    return f"the plan to go to {name}, {length}{doubt}"
+    detour = ""
+    if plan.detour_for:
+        layer = max(plan.detour_for, key=plan.detour_for.__getitem__)
+        detour = f"; the route before is dearer now: {layer.value}"
+    return f"the plan to go to {name}, {length}{doubt}{detour}"
 
 
 def _episode(episode: Episode) -> str:

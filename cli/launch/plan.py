@@ -39,7 +39,7 @@ HOME = Goal(id=goal_id("home"))
 HOME_AFTER = 1.5
 """An agent may take so many times as long to its goals as it explored."""
 LAP_S = 300.0
-LAP_UNKNOWN_WEIGHT = 0.5
+LAP_UNKNOWN_COST = 2.0
 """A lap leads along streets that are not known yet, where those that are known lead there too."""
 
 
@@ -137,7 +137,7 @@ def _give_goals(sections: Sections, choices: Choices) -> None:
         laps = choices.laps or 1.0
         workspace["goals"] = _of_laps(sim.get("seed", SimConfig().seed), laps)
         workspace["in_order"] = True
-        sections["planning"].setdefault("unknown_weight", LAP_UNKNOWN_WEIGHT)
+        sections["planning"].setdefault("unknown_cost", LAP_UNKNOWN_COST)
         sim.setdefault("duration_s", max(SimConfig().duration_s, LAP_S * laps))
 
     if workspace.get("goals"):

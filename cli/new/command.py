@@ -143,15 +143,7 @@ def _write_project_codelet(name: str) -> None:
         codelets / f"{name}.py": _filled("codelet", values),
         Path("tests/unit/codelets") / f"test_{name}.py": _filled("codelet_test", values),
     }
-    imported = f"from cogmap.services.codelets import {name}"
-    first = "from cogmap.services.codelets.attention import"
-    rows = [
-        before(codelets / "table.py", first, imported),
-        at_end_of(codelets / "table.py", "CODELETS: ", f"    {name}.CODELET,"),
-        before(codelets / "sections.py", first, imported),
-        at_end_of(codelets / "sections.py", "SECTIONS: ", f"    {name}.NAME: {name}.Config,"),
-    ]
-    _write(files, rows)
+    _write(files, [at_end_of(codelets / "table.py", "ROWS = (", f'    Row("{name}", "{name}"),')])
 
 
 def _write_project_module(name: str, class_name: str) -> None:

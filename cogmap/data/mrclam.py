@@ -78,8 +78,8 @@ _TRUTH = _Columns(4, "a time, x, y and a heading")
 
 
 def read(folder: Path) -> Recording:
-    """The set in `folder`. Raises UsageError naming a file that is missing, or the line that is
-    wrong.
+    """Return the set in `folder`. Raises UsageError naming a file that is missing, or the line that
+    is wrong.
     """
     if not folder.is_dir():
         raise UsageError(

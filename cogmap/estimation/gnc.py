@@ -15,14 +15,14 @@ import numpy as np
 from cogmap.estimation.hypotheses import Hypotheses
 from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pose_graph import PoseGraph, mahalanobis2, residuals
-from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.arrays import Booleans
 
 CONVEXITY_FACTOR = 1.4
 MAX_ROUNDS = 60
 MIN_WEIGHT = 1e-6
-# A round need not converge: the next one goes on with other weights.
+# A round need not converge: the next one has other weights.
 ITERATIONS_PER_ROUND = 20
-# Where weights leave fewer, most closures contradict one another, and who fell first says little.
+# If weights leave fewer, most closures contradict one another, and which fell first means little.
 RELIABLE_SHARE = 0.5
 
 
@@ -49,34 +49,23 @@ def _by_weights(graph: PoseGraph, hypotheses: Hypotheses) -> Booleans:
     convexity = 0.0
 
     for _ in range(MAX_ROUNDS):
-        excess = _excess(graph, weights * hypotheses.shares, hypotheses.threshold)
+        # Each closure's misfit of the path that so weighted ones lead to, over its threshold.
+        closures = graph.closures
+        weighted = graph.with_closures(closures.weighted(weights * hypotheses.shares))
+        residual = residuals(optimize(weighted, ITERATIONS_PER_ROUND), closures)
+        excess = mahalanobis2(residual, closures.information) / hypotheses.threshold
         if not convexity:
             worst = excess.max()
             if worst <= 1:
                 break
             convexity = 1 / (2 * worst - 1)
 
-        weights = _weights(excess, convexity)
+        # The weights of the surrogate of truncated least squares.
+        squared = convexity * (convexity + 1) / excess.clip(1e-12)
+        weights = (np.sqrt(squared) - convexity).clip(MIN_WEIGHT, 1.0)
         is_decided = (weights == MIN_WEIGHT) | (weights == 1.0)
         if is_decided.all():
             break
         convexity *= CONVEXITY_FACTOR
 
     return weights > 0.5
-
-
-def _excess(graph: PoseGraph, weights: Floats, threshold: Floats) -> Floats:
-    """(m,): each closure's misfit of the path that so weighted ones lead to, over its threshold."""
-    closures = graph.closures
-    weighted = graph.with_closures(closures.weighted(weights))
-    poses = optimize(weighted, ITERATIONS_PER_ROUND)
-
-    residual = residuals(poses, closures)
-    return mahalanobis2(residual, closures.information) / threshold
-
-
-def _weights(excess: Floats, convexity: float) -> Floats:
-    """The weights of the surrogate of truncated least squares."""
-    squared = convexity * (convexity + 1) / excess.clip(1e-12)
-    surrogate = np.sqrt(squared) - convexity
-    return surrogate.clip(MIN_WEIGHT, 1.0)

@@ -2,10 +2,10 @@
 (beyond the paper).
 
 Two streets that look alike give closures that agree with one another: many as they are, they are
-all mistaken at once. What all others contradict once it is left out is not believed.
+all mistaken at once. What all others contradict once it is left out is rejected.
 
-By how much closures may be off, the path tells itself. Where it fits better than its information
-states, that is understated, and a false closure would seem possible that is not. The variance
+The path's fit sets the tolerance for closures. If it fits better than its information states, that
+is understated, and a false closure would seem possible that is not. The variance
 factor (a posteriori variance of unit weight: the least cost over the degrees of freedom) scales it.
 """
 
@@ -54,11 +54,22 @@ class Hypotheses:
         and all that agree with all others.
         """
         remaining, factor = self._without_contradicted(accepted)
-        return self._readmitted(remaining, factor)
+        solver = IncrementalSolver(self._with(remaining))
+        result = remaining.copy()
+
+        # Outliers may agree with all inliers: the path between the two may be long and uncertain.
+        # What most closures state comes first.
+        order = np.argsort(-self._support, kind="stable")
+        for number in order[~remaining[order]].tolist():
+            if self._misfit(solver, number) <= factor:
+                solver.add(self._graph.closures.select(np.array([number])))
+                result[number] = True
+
+        return result
 
     def truncated_cost(self, accepted: Booleans) -> float:
-        """What truncated least squares makes least: the cost of the path by the accepted closures,
-        and the thresholds of all others, each hypothesis counted once.
+        """Return what truncated least squares makes least: the cost of the path by the accepted
+        closures, and the thresholds of all others, each hypothesis counted once.
         """
         closures = self._graph.closures.weighted(self.shares).select(accepted)
         graph = self._graph.with_closures(closures)
@@ -76,40 +87,26 @@ class Hypotheses:
         while remaining.any():
             solver = IncrementalSolver(self._with(remaining))
             factor = self._variance_factor(solver, remaining)
-            doubtful = _by_doubt(solver, np.flatnonzero(remaining))
+            before = remaining
+            not_contradicted = 0
+            for members in _by_doubt(solver, np.flatnonzero(remaining)):
+                others = remaining.copy()
+                others[members] = False
 
-            left = self._tested(doubtful, remaining, factor)
-            if left.sum() == remaining.sum():
+                # Does the path by the others contradict the hypothesis, by its middle closure?
+                middle = members[len(members) // 2]
+                if self._misfit(IncrementalSolver(self._with(others)), middle) > factor:
+                    remaining = others
+                    not_contradicted = 0
+                else:
+                    not_contradicted += 1
+                if not_contradicted == DOUBTED:
+                    break
+
+            if remaining.sum() == before.sum():
                 break
-            remaining = left
 
         return remaining, factor
-
-    def _tested(self, doubtful: list[Indices], accepted: Booleans, factor: float) -> Booleans:
-        """(m,): the accepted without those of the doubtful hypotheses that the rest contradict,
-        until DOUBTED in a row are not contradicted.
-        """
-        remaining = accepted
-        held = 0
-        for members in doubtful:
-            others = remaining.copy()
-            others[members] = False
-
-            if self._contradict(others, members, factor):
-                remaining = others
-                held = 0
-            else:
-                held += 1
-            if held == DOUBTED:
-                break
-
-        return remaining
-
-    def _contradict(self, others: Booleans, members: Indices, factor: float) -> bool:
-        """Whether a path by the others contradicts a hypothesis, by its middle closure."""
-        solver = IncrementalSolver(self._with(others))
-        middle = members[len(members) // 2]
-        return self._misfit(solver, middle) > factor
 
     def _misfit(self, solver: IncrementalSolver, number: int) -> float:
         """A closure's distance from what the solver's predict of it, over its threshold."""
@@ -118,7 +115,7 @@ class Hypotheses:
 
     def _variance_factor(self, solver: IncrementalSolver, accepted: Booleans) -> float:
         """By how much the variances are less than stated, of a path by the accepted closures: 1
-        where they are not, or where there are too few hypotheses to know.
+        if they are not, or if there are too few hypotheses to know.
 
         It is the greatest that the cost allows for, but with probability `false_closure`.
         Closures of one hypothesis may err alike, and give one's degrees of freedom together.
@@ -129,23 +126,6 @@ class Hypotheses:
 
         least_cost = float(chdtri(degrees, 1 - self._false_closure))
         return min(1.0, (STATED_DEGREES + solver.cost) / least_cost)
-
-    def _readmitted(self, accepted: Booleans, factor: float) -> Booleans:
-        """(m,): the accepted, and the outliers that agree with all inliers: the path between the
-        two may be long and uncertain. What most closures state comes first.
-        """
-        solver = IncrementalSolver(self._with(accepted))
-        result = accepted.copy()
-
-        order = np.argsort(-self._support, kind="stable")
-        outliers = order[~accepted[order]]
-        for number in outliers.tolist():
-            if self._misfit(solver, number) <= factor:
-                closure = self._graph.closures.select(np.array([number]))
-                solver.add(closure)
-                result[number] = True
-
-        return result
 
     def _with(self, accepted: Booleans) -> PoseGraph:
         """The path with the accepted closures alone."""

@@ -29,7 +29,7 @@ ITERATIONS_PER_CLOSURE = 10
 
 
 class _Update(NamedTuple):
-    """What one closure changes: `step` (u,) of the unknowns, and the columns (u, 3) by which
+    """The change by one closure: `step` (u,) of the unknowns, and the columns (u, 3) by which
     solutions of the normal equations shrink once it is in. `chi_square` is its misfit.
     """
 
@@ -42,7 +42,7 @@ class IncrementalSolver:
     """The factors of a path's normal equations, and the updates by the closures since.
 
     A closure adds three columns by Woodbury's identity, and one Gauss-Newton step corrects the
-    path, for its turns are small. Where the cost of eq. 7 shows that they were not, the path is
+    path, for its turns are small. If the cost of eq. 7 shows that they were not, the path is
     optimized and factored anew, in bounded time: what some iterations leave undone is left to the
     next closures and to `relinearize`.
     """
@@ -104,19 +104,12 @@ class IncrementalSolver:
         closures = graph.closures + closure
         self.graph = replace(graph, poses=poses, closures=closures)
 
+        # The cost of the path may be above what the linear updates predict.
         self._cost += update.chi_square
-        if self._is_inaccurate():
+        if cost(poses, self.graph.constraints) > (1 + TOLERANCE) * self._cost:
             self._relinearize(self.graph, ITERATIONS_PER_CLOSURE)
 
         return self.graph.poses
-
-    def _is_inaccurate(self) -> bool:
-        """Whether the cost of the path is above what the linear updates predict."""
-        graph = self.graph
-        after = cost(graph.poses, graph.constraints)
-
-        predicted = (1 + TOLERANCE) * self._cost
-        return after > predicted
 
     def _update(self, closure: Constraints) -> _Update:
         root = sqrt_information(closure.information)[0]

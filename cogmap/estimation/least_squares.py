@@ -106,17 +106,12 @@ class _BlockPattern:
         blocks, target = np.unique(keys, return_inverse=True)
 
         self._sum = _summing(target, used, len(blocks), len(rows))
-        self._compress(blocks, unknown_poses)
 
-    def _compress(self, keys: Indices, unknown_poses: int) -> None:
-        """Where blocks are stored: by column, and by row within it, as `keys` count them."""
-        self._indices = (keys % unknown_poses).astype(np.int32)
-
+        # Blocks are stored by column, and by row within it, as their keys count them.
         first_keys = np.arange(unknown_poses + 1) * unknown_poses
-        self._starts = np.searchsorted(keys, first_keys).astype(np.int32)
-
-        side = 3 * unknown_poses
-        self._shape = (side, side)
+        self._indices = (blocks % unknown_poses).astype(np.int32)
+        self._starts = np.searchsorted(blocks, first_keys).astype(np.int32)
+        self._shape = (3 * unknown_poses, 3 * unknown_poses)
 
     def summed(self, blocks: Floats) -> sparse.csc_matrix:
         """The matrix of (4 m, 3, 3) blocks, each transposed: columns are stored, and blocks by
@@ -188,7 +183,13 @@ def optimize(graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> Floats:
     before = cost(poses, constraints)
 
     for _ in range(max_iterations):
-        step, predicted_decrease = _step(normal, poses, constraints, damping)
+        gradient = normal.gradient(poses, constraints)
+        matrix = normal.matrix(poses, constraints)
+        if damping:
+            matrix = matrix + damping * sparse.diags(matrix.diagonal(), format="csc")
+        step = factor(matrix).solve(gradient)
+        predicted_decrease = float(gradient @ step)
+
         moved = normal.moved(poses, -step)
         after = cost(moved, constraints)
 
@@ -208,34 +209,6 @@ def optimize(graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> Floats:
         is_linear = not damping and unpredicted <= least_decrease
         if decrease <= least_decrease or is_linear:
             break
-        damping = _less(damping)
+        damping = damping / DAMPING_FACTOR if damping > MIN_DAMPING else 0.0
 
     return poses
-
-
-def _step(
-    normal: NormalEquations, poses: Floats, constraints: Constraints, damping: float
-) -> tuple[Floats, float]:
-    """The step of the unknowns against their gradient, and the decrease of the cost that it would
-    make if the constraints were linear.
-    """
-    gradient = normal.gradient(poses, constraints)
-    matrix = normal.matrix(poses, constraints)
-
-    damped = _damped(matrix, damping)
-    step: Floats = factor(damped).solve(gradient)
-    return step, float(gradient @ step)
-
-
-def _damped(matrix: sparse.csc_matrix, damping: float) -> sparse.csc_matrix:
-    if not damping:
-        return matrix
-
-    diagonal = sparse.diags(matrix.diagonal(), format="csc")
-    return matrix + damping * diagonal
-
-
-def _less(damping: float) -> float:
-    if damping <= MIN_DAMPING:
-        return 0.0
-    return damping / DAMPING_FACTOR

@@ -1,7 +1,7 @@
 """Which loop closures agree with one another: a single view may be of another place or landmark
 than it seems.
 
-Beyond the paper, whose landmarks are never confused. Two closures agree where what they join is as
+Beyond the paper, whose landmarks are never confused. Two closures agree if what they join is as
 far apart on this pass as it was on the earlier one, by path integration within each pass alone;
 what the agent believes of its pose is not used. At least MIN_AGREEING must agree with one another
 (pairwise consistency, as in Mangelson et al. 2018, doi 10.1109/ICRA.2018.8460217).
@@ -42,7 +42,7 @@ class Views(NamedTuple):
 
     It stands at `there_m` (m, 2) in the frame of place i and at `here_m` (m, 2) in that of place j,
     x forward, y left, known to `sd_m` (m,). The heading between the two places is known to
-    `sd_rad` (m,), or unknown where that is 0.
+    `sd_rad` (m,), or unknown if that is 0.
     """
 
     i: Indices
@@ -59,12 +59,12 @@ class Views(NamedTuple):
 
     @property
     def there(self) -> Points:
-        """What was seen, from the places before."""
+        """The points that were seen, from the places before."""
         return Points(self.i, self.there_m)
 
     @property
     def here(self) -> Points:
-        """What was seen, from the later places."""
+        """The same points, from the later places."""
         return Points(self.j, self.here_m)
 
     def select(self, chosen: Booleans | Indices) -> Views:
@@ -175,9 +175,18 @@ def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float)
     here_m2 = path.variance_m2(one.here, other.here)
     path_m2 = there_m2 + here_m2
 
+    # How far apart the two views' points are on either pass, in squared Mahalanobis distance.
+    difference_m = path.between_m(one.there, other.there) - path.between_m(one.here, other.here)
+    squared = difference_m**2 / (one.sd_m**2 + other.sd_m**2 + path_m2)
+
+    # The turn between the two views on either pass, if both know their heading.
     has_heading = one.has_heading & other.has_heading
-    squared = _distance_squared(one, other, path, path_m2)
-    squared += np.where(has_heading, _turn_squared(one, other, path), 0.0)
+    turned_rad = wrap_angle(path.turn_rad(one.j, other.j) - path.turn_rad(one.i, other.i))
+    seen_rad2 = one.sd_rad**2 + other.sd_rad**2
+    there_rad2 = path.variance_rad2(one.i, other.i)
+    here_rad2 = path.variance_rad2(one.j, other.j)
+    variance_rad2 = np.maximum(seen_rad2 + there_rad2 + here_rad2, 1e-12)
+    squared += np.where(has_heading, turned_rad**2 / variance_rad2, 0.0)
 
     degrees = np.where(has_heading, 3, 2)
     is_consistent = squared <= chdtri(degrees, false_closure)
@@ -186,32 +195,3 @@ def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float)
     is_apart = one.j != other.j
     agree: Booleans = is_consistent & is_near & is_apart
     return agree
-
-
-def _distance_squared(one: Views, other: Views, path: _DeadReckoning, path_m2: Floats) -> Floats:
-    """(m,): the squared Mahalanobis distance of how far apart two views' points are on either pass,
-    path integration being uncertain by `path_m2`.
-    """
-    there_m = path.between_m(one.there, other.there)
-    here_m = path.between_m(one.here, other.here)
-    difference_m = there_m - here_m
-
-    variance_m2 = one.sd_m**2 + other.sd_m**2 + path_m2
-    squared: Floats = difference_m**2 / variance_m2
-    return squared
-
-
-def _turn_squared(one: Views, other: Views, path: _DeadReckoning) -> Floats:
-    """(m,): the squared Mahalanobis distance of the turn between two views on either pass."""
-    here_rad = path.turn_rad(one.j, other.j)
-    there_rad = path.turn_rad(one.i, other.i)
-    turned_rad = wrap_angle(here_rad - there_rad)
-
-    seen_rad2 = one.sd_rad**2 + other.sd_rad**2
-    there_rad2 = path.variance_rad2(one.i, other.i)
-    here_rad2 = path.variance_rad2(one.j, other.j)
-    variance_rad2 = seen_rad2 + there_rad2 + here_rad2
-
-    positive_rad2 = np.maximum(variance_rad2, 1e-12)
-    squared: Floats = turned_rad**2 / positive_rad2
-    return squared

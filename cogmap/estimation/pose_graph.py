@@ -19,7 +19,7 @@ class Constraints:
     """m constraints; number k measures pose `j[k]` in the frame of pose `i[k]`.
 
     `measurement` (m, 3) is dx_m, dy_m, dheading_rad; `information` (m, 3, 3) is the inverse of its
-    covariance, and singular where the heading is not measured.
+    covariance, and singular if the heading is not measured.
     """
 
     i: Indices
@@ -32,13 +32,13 @@ class Constraints:
 
     @property
     def variance_m2(self) -> Floats:
-        """(m,): the variance of the positions, where it is the same by either axis."""
+        """(m,): the variance of the positions, if it is the same by either axis."""
         variance_m2: Floats = 1 / self.information[:, 0, 0]
         return variance_m2
 
     @property
     def variance_rad2(self) -> Floats:
-        """(m,): the variance of the headings, where they are measured by themselves."""
+        """(m,): the variance of the headings, if they are measured by themselves."""
         variance_rad2: Floats = 1 / self.information[:, 2, 2]
         return variance_rad2
 
@@ -89,11 +89,13 @@ class PoseGraph:
         """Sort constraints into steps and closures. The first constraint from a pose to the next is
         the step.
 
-        Raises MessageError where a pose has no step to the next.
+        Raises MessageError if a pose has no step to the next.
         """
-        steps = _first_steps(constraints)
+        successive = np.flatnonzero(constraints.j == constraints.i + 1)
+        _, first = np.unique(constraints.i[successive], return_index=True)
+        steps = successive[first]
         if len(steps) != len(poses) - 1:
-            pose = _pose_without_step(len(poses), constraints.i[steps])
+            pose = int(np.setdiff1d(np.arange(len(poses) - 1), constraints.i[steps])[0])
             raise MessageError(
                 f"no constraint leads from pose {pose} to the next: a path needs every step"
             )
@@ -114,23 +116,6 @@ class PoseGraph:
     def constraints(self) -> Constraints:
         """All constraints, the steps first."""
         return self.steps + self.joins + self.closures
-
-
-def _first_steps(constraints: Constraints) -> Indices:
-    """The first constraint from each pose to the next, by number."""
-    successive = np.flatnonzero(constraints.j == constraints.i + 1)
-    origins = constraints.i[successive]
-
-    _, first = np.unique(origins, return_index=True)
-    steps: Indices = successive[first]
-    return steps
-
-
-def _pose_without_step(poses: int, origins: Indices) -> int:
-    """The first of the poses, but the last, that no step leads from."""
-    expected = np.arange(poses - 1)
-    missing = np.setdiff1d(expected, origins)
-    return int(missing[0])
 
 
 def diagonal_information(position: Floats, heading: Floats) -> Floats:

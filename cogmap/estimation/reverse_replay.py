@@ -54,9 +54,14 @@ class Displacements:
 
 
 def displacements(poses: Floats, constraints: Constraints) -> Displacements:
-    """What `constraints` measure of positions where the headings are those of `poses`."""
+    """Return what `constraints` measure of positions if the headings are those of `poses`."""
     covariance = _inverse(constraints.information[:, :2, :2])
-    expected_m = _expected_m(poses, constraints, covariance)
+
+    # If position and heading are measured together, the position that is expected changes with the
+    # error of the heading.
+    heading_error_rad = residuals(poses, constraints)[:, 2]
+    coupling = constraints.information[:, :2, 2] * heading_error_rad[:, None]
+    expected_m = constraints.measurement[:, :2] - matvec(covariance, coupling)
 
     heading_rad = poses[constraints.i, 2]
     turn = rotation_matrices(heading_rad)
@@ -64,20 +69,6 @@ def displacements(poses: Floats, constraints: Constraints) -> Displacements:
         rotate(expected_m, heading_rad),
         turn @ covariance @ turn.mT,
     )
-
-
-def _expected_m(poses: Floats, constraints: Constraints, covariance: Floats) -> Floats:
-    """(m, 2): the offsets that are expected where headings are those of `poses`.
-
-    Where position and heading are measured together, the position that is expected changes with the
-    error of the heading.
-    """
-    heading_error_rad = residuals(poses, constraints)[:, 2]
-    coupling = constraints.information[:, :2, 2] * heading_error_rad[:, None]
-    by_heading_m = matvec(covariance, coupling)
-
-    expected_m: Floats = constraints.measurement[:, :2] - by_heading_m
-    return expected_m
 
 
 def position_cost(positions_m: Floats, constraints: Constraints, known: Displacements) -> float:
@@ -93,30 +84,23 @@ class Loops:
     """The loops of one path, and the forces by which they hold it together."""
 
     def __init__(self, graph: PoseGraph) -> None:
-        self._orient(graph.poses, graph.closures)
-        self._integrate(graph.poses, graph.steps)
-
-        along_m2 = self._across(cumulative(self._step_m2))
-        self.gain = _inverse(along_m2 + self._closing_m2)
-
-    def _orient(self, poses: Floats, closures: Constraints) -> None:
-        """Turn each loop so that it starts before it ends."""
+        # Each loop is turned so that it starts before it ends.
+        closures = graph.closures
         backwards = closures.i > closures.j
         self._start = np.where(backwards, closures.j, closures.i)
         self._end = np.where(backwards, closures.i, closures.j)
 
-        closing = displacements(poses, closures)
-        offset_m = closing.offset_m
-        self._closing_m = np.where(backwards[:, None], -offset_m, offset_m)
+        closing = displacements(graph.poses, closures)
+        self._closing_m = np.where(backwards[:, None], -closing.offset_m, closing.offset_m)
         self._closing_m2 = closing.covariance_m2
 
-    def _integrate(self, poses: Floats, steps: Constraints) -> None:
-        """Path integration alone, from the first of `poses`."""
-        step = displacements(poses, steps)
-        moved_m = cumulative(step.offset_m)
-
-        self._integrated_m = poses[0, :2] + moved_m
+        # Path integration alone, from the first pose.
+        step = displacements(graph.poses, graph.steps)
+        self._integrated_m = graph.poses[0, :2] + cumulative(step.offset_m)
         self._step_m2 = step.covariance_m2
+
+        along_m2 = self._across(cumulative(self._step_m2))
+        self.gain = _inverse(along_m2 + self._closing_m2)
 
     @property
     def discrepancy_m(self) -> Floats:
@@ -235,7 +219,7 @@ def with_positions_only(graph: PoseGraph) -> PoseGraph:
 class _ConjugateGradients:
     """The forces of `loops`, corrected replay by replay, as many as `replays` so far.
 
-    `gained` is what the next replay would gain; it is not above 0 where nothing is left to gain.
+    `gained` is what the next replay would gain; it is not above 0 if nothing is left to gain.
     """
 
     def __init__(self, loops: Loops) -> None:

@@ -41,21 +41,21 @@ def interpolate(known: Floats, values: Floats, at: Floats) -> Floats:
 
 
 def resample(points_m: Floats, spacing_m: float) -> Floats:
-    """The same polyline with a point every `spacing_m` from its first, (k, 2). Its last point is
-    left out unless it is due.
+    """Return the same polyline with a point every `spacing_m` from its first, (k, 2). Its last
+    point is left out unless it is due.
     """
     length_m = distances_along(points_m)[-1]
     return points_at(points_m, np.arange(0.0, length_m, spacing_m))
 
 
 def nearest_on_line(line_m: Floats, points_m: Floats) -> Nearest:
-    """The nearest of a polyline to each of (k, 2) points."""
+    """Return the nearest of a polyline to each of (k, 2) points."""
     return nearest_on_pieces(line_m[:-1], line_m[1:], points_m)
 
 
 def nearest_on_pieces(starts_m: Floats, ends_m: Floats, points_m: Floats) -> Nearest:
-    """The nearest of m straight pieces, from (m, 2) `starts_m` to `ends_m`, to each of (k, 2)
-    points.
+    """Return the nearest of m straight pieces, from (m, 2) `starts_m` to `ends_m`, to each of (k,
+    2) points.
     """
     found = [
         _nearest(starts_m, ends_m, points_m[start : start + CHUNK])

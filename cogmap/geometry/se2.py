@@ -15,7 +15,7 @@ FULL_TURN_RAD = 2 * np.pi
 
 
 def wrap_angle(angle_rad: Floats) -> Floats:
-    """The same angles in (-pi, pi], any shape."""
+    """Return the same angles in (-pi, pi], any shape."""
     from_pi = (np.pi - angle_rad) % FULL_TURN_RAD
     wrapped: Floats = np.pi - from_pi
     return wrapped
@@ -57,14 +57,14 @@ def transform_to(pose: Floats, points_m: Floats) -> Floats:
 
 
 def compose(pose: Floats, step: Floats) -> Floats:
-    """The pose that is `step` in the frame of `pose`, (..., 3)."""
+    """Return the pose that is `step` in the frame of `pose`, (..., 3)."""
     position_m = transform_from(pose, step[..., :2])
     heading_rad = pose[..., 2] + step[..., 2]
     return _pose(position_m, heading_rad)
 
 
 def relative(origin: Floats, pose: Floats) -> Floats:
-    """`pose` in the frame of `origin`, (..., 3); `compose` undoes it."""
+    """Return `pose` in the frame of `origin`, (..., 3); `compose` undoes it."""
     position_m = transform_to(origin, pose[..., :2])
     heading_rad = pose[..., 2] - origin[..., 2]
     return _pose(position_m, heading_rad)
@@ -116,18 +116,6 @@ def mean_pose(poses: Floats) -> Floats:
     cos = weights @ np.cos(headings_rad)
     mean[2] = np.arctan2(sin, cos)
     return mean
-
-
-def motion_onto(points_m: Floats, others_m: Floats) -> Floats:
-    """(3,): the pose that moves (k, 2) points onto others with the least squares (Umeyama 1991)."""
-    middle_m = points_m.mean(axis=0)
-    other_middle_m = others_m.mean(axis=0)
-    x, y = (points_m - middle_m).T
-    u, v = (others_m - other_middle_m).T
-
-    turn_rad = np.arctan2((x * v - y * u).sum(), (x * u + y * v).sum())
-    shift_m = other_middle_m - rotate(middle_m, turn_rad)
-    return np.array([*shift_m, turn_rad])
 
 
 def cumulative(values: Floats) -> Floats:

@@ -20,7 +20,7 @@ class TopicDiff(msgspec.Struct, kw_only=True):
     """How a topic compares: messages in each log, the `same` in both, those that differ or are in
     one only.
 
-    `first` is the first difference in words, empty where there is none.
+    `first` is the first difference in words, empty if there is none.
     """
 
     topic: str
@@ -44,7 +44,7 @@ class Diff(msgspec.Struct, kw_only=True):
 
 
 def model_topics() -> list[Topic]:
-    """The topics whose bytes are the same for the same seed."""
+    """Return the topics whose bytes are the same for the same seed."""
     return [topic for topic in topics.ALL if topic.scope is Scope.MODEL]
 
 
@@ -57,7 +57,7 @@ def diff(
     """Compare the messages on `chosen`, every MODEL topic where it is None, by source, incarnation
     and number.
 
-    Raises LogError where one is no log, or damaged.
+    Raises LogError if one is no log, or damaged.
     """
     if chosen is None:
         chosen = model_topics()
@@ -73,7 +73,10 @@ class _Comparison:
         self._chosen = chosen
         self._found: dict[str, TopicDiff] = {}
         self._first = ""
-        self._sides = _names(left.path, right.path)
+        # Sentences call the logs by their files' names or, if these are equal, by their paths.
+        self._sides = left.path.name, right.path.name
+        if left.path.name == right.path.name:
+            self._sides = str(left.path), str(right.path)
 
     def run(self, progress: Progress | None) -> Diff:
         """Compare every message of either log."""
@@ -82,15 +85,28 @@ class _Comparison:
             self._of(record).right += 1
 
         for key, record in _keyed(self._left, self._chosen, progress):
-            self._of(record).left += 1
-            self._compare(record, unmatched.pop(key, None))
+            found = self._of(record)
+            found.left += 1
+            other = unmatched.pop(key, None)
+            if other is None:
+                found.left_only += 1
+                self._note(record, self._in_one_only(self._left, record, 0))
+                continue
+
+            payload = self._left.payload(record)
+            counterpart = self._right.payload(other)
+            if payload == counterpart:
+                found.same += 1
+                continue
+            found.different += 1
+            if not found.first:
+                sentence = compare.describe(record.topic, payload, counterpart, self._sides)
+                self._note(record, sentence)
 
         for record in unmatched.values():
             self._of(record).right_only += 1
             self._note(record, self._in_one_only(self._right, record, 1))
-        return self._result()
 
-    def _result(self) -> Diff:
         names = [topic.name for topic in topics.ALL if topic.name in self._found]
         return Diff(
             left=str(self._left.path),
@@ -99,25 +115,6 @@ class _Comparison:
             first=self._first,
             topics=[self._found[name] for name in names],
         )
-
-    def _compare(self, record: Record, other: Record | None) -> None:
-        """Compare a message of the left log with its counterpart in the right one."""
-        found = self._of(record)
-        if other is None:
-            found.left_only += 1
-            self._note(record, self._in_one_only(self._left, record, 0))
-            return
-
-        payload = self._left.payload(record)
-        counterpart = self._right.payload(other)
-        if payload == counterpart:
-            found.same += 1
-            return
-
-        found.different += 1
-        if not found.first:
-            sentence = compare.describe(record.topic, payload, counterpart, self._sides)
-            self._note(record, sentence)
 
     def _in_one_only(self, reader: LogReader, record: Record, side: int) -> str:
         name = compare.title(record.topic, reader.stub(record))
@@ -138,17 +135,10 @@ class _Comparison:
         return self._found[name]
 
 
-def _names(left: Path, right: Path) -> tuple[str, str]:
-    """How sentences call the two logs: by their files' names, or by paths where these are equal."""
-    if left.name != right.name:
-        return left.name, right.name
-    return str(left), str(right)
-
-
 def _keyed(
     reader: LogReader, chosen: Collection[Topic], progress: Progress | None
 ) -> Iterator[tuple[Key, Record]]:
-    """Each message with what names it in either log.
+    """Yield each message with what names it in either log.
 
     A source's incarnations are counted, as the times that they are known by differ.
     """

@@ -69,74 +69,54 @@ class _Tally:
 
 
 def info(path: Path, progress: Progress | None = None) -> Info:
-    """What is in the log at `path`. Raises LogError."""
+    """Read what is in the log at `path`. Raises LogError."""
     reader = LogReader(path)
     recording = reader.about(layout.RECORDING)
-    began_ns = _time_ns(recording.get("began_ns", ""))
+    # Metadata have no checksum: the time may be none.
+    began = recording.get("began_ns", "")
+    began_ns = int(began) if began.isdecimal() else 0
     sequences = SequenceTracker(since_ns=began_ns or None)
-    tallies = _tallies(reader, sequences, progress)
-    lost = sequences.lost()
 
+    recorded = {channel.topic for channel in reader.channels.values()}
+    tallies = {name: _Tally() for name in recorded if name in BY_NAME}
+    for record in reader.records(progress=progress):
+        tallies.setdefault(record.topic_name, _Tally()).add(record)
+        if record.envelope is not None:
+            sequences.follow(record.topic, record.envelope)
+
+    lost = sequences.lost()
+    duration_s = reader.span_s
     rows = []
-    for name, tally in tallies.items():
-        rows.append(_topic(name, tally, reader.span_s, lost.get(name, 0)))
+    for channel in reader.channels.values():
+        tally = tallies.pop(channel.topic, None)
+        if tally is None:
+            continue
+        topic = BY_NAME[channel.topic]
+        rows.append(
+            TopicInfo(
+                topic=topic.name,
+                type=topic.type.__name__,
+                delivery=topic.delivery.value,
+                count=tally.count,
+                rate_hz=tally.count / duration_s if duration_s > 0 else 0.0,
+                mean_bytes=tally.size / tally.count if tally.count else 0.0,
+                lost=lost.get(topic.name, 0),
+                sources=dict(sorted(tally.sources.items())),
+            )
+        )
+
     return Info(
         path=str(path),
         software=recording.get("software", ""),
         agent=recording.get("agent", ""),
         began_ns=began_ns or reader.span_ns[0],
-        duration_s=reader.span_s,
+        duration_s=duration_s,
         size_bytes=reader.size_bytes,
-        messages=sum(tally.count for tally in tallies.values()),
+        messages=sum(row.count for row in rows),
         finished=bool(reader.about(layout.SUMMARY)),
         cut_bytes=reader.cut_bytes,
         gaps=sequences.gaps(),
-        unknown=_unknown(reader),
+        unknown=sorted(recorded - {*BY_NAME, layout.ENVELOPES}),
         config=recorded_config(reader),
         topics=rows,
-    )
-
-
-def _time_ns(text: str) -> int:
-    """A recorded time; 0 where it is none, as metadata have no checksum."""
-    return int(text) if text.isdecimal() else 0
-
-
-def _tallies(
-    reader: LogReader, sequences: SequenceTracker, progress: Progress | None
-) -> dict[str, _Tally]:
-    """The messages of each topic that the log has a channel for; follows their numbers too."""
-    tallies: dict[str, _Tally] = {}
-    for channel in reader.channels.values():
-        if channel.topic in BY_NAME:
-            tallies[channel.topic] = _Tally()
-
-    for record in reader.records(progress=progress):
-        name = record.topic_name
-        tally = tallies.setdefault(name, _Tally())
-        tally.add(record)
-        envelope = record.envelope
-        if envelope is not None:
-            sequences.follow(record.topic, envelope)
-    return tallies
-
-
-def _unknown(reader: LogReader) -> list[str]:
-    channels = reader.channels.values()
-    names = {channel.topic for channel in channels}
-    known = {*BY_NAME, layout.ENVELOPES}
-    return sorted(names - known)
-
-
-def _topic(name: str, tally: _Tally, duration_s: float, lost: int) -> TopicInfo:
-    topic = BY_NAME[name]
-    return TopicInfo(
-        topic=name,
-        type=topic.type.__name__,
-        delivery=topic.delivery.value,
-        count=tally.count,
-        rate_hz=tally.count / duration_s if duration_s > 0 else 0.0,
-        mean_bytes=tally.size / tally.count if tally.count else 0.0,
-        lost=lost,
-        sources=dict(sorted(tally.sources.items())),
     )

@@ -29,7 +29,7 @@ class Entry:
     """A message in a log.
 
     `time_s` is when it was received, in seconds since the log's first message; `log_time_ns` the
-    same on the recorder's wall clock. `envelope` is None where the log holds none.
+    same on the recorder's wall clock. `envelope` is None if the log holds none.
     """
 
     topic: str
@@ -83,11 +83,11 @@ class Log:
     def messages(
         self, *topics: str, start_s: float = 0.0, end_s: float | None = None
     ) -> Iterator[Entry]:
-        """Messages on `topics`, on all where none is named, in the order in which they were
+        """Yield messages on `topics`, on all if none is named, in the order in which they were
         received.
 
         Those from `start_s` (inclusive) to `end_s` (exclusive) into the log. Raises UsageError for
-        an unknown topic; LogError where the log is damaged or a message does not fit its topic.
+        an unknown topic; LogError if the log is damaged or a message does not fit its topic.
         """
         chosen = selection.named(topics) or None
         for record in self._between(chosen, start_s, end_s):
@@ -100,7 +100,7 @@ class Log:
             )
 
     def last(self, topic: str, holds: Callable[[Any], bool]) -> Entry | None:
-        """The last message on `topic` for which `holds` is true; None where it is for none.
+        """Return the last message on `topic` for which `holds` is true; None if it is for none.
 
         What is true for a message must be true for those before it, as that it is of a cycle or
         before. It is found by bisection: little of a long log is read. Raises as `messages` does.
@@ -124,9 +124,9 @@ class Log:
         return found
 
     def graph_at(self, time_s: float) -> Graph:
-        """The workspace's graph after every delta received up to `time_s` into the log.
+        """Return the workspace's graph after every delta received up to `time_s` into the log.
 
-        Raises LogError where the log lacks a delta before that, as one does that was begun in the
+        Raises LogError if the log lacks a delta before that, as one does that was begun in the
         middle of a drive.
         """
         graph = Graph()
@@ -165,7 +165,7 @@ class Log:
 def open_log(path: Path | str) -> Log:
     """Open the log at `path` for reading.
 
-    Raises LogError where there is none, or it is foreign, damaged or of a version that is not read.
+    Raises LogError if there is none, or it is foreign, damaged or of a version that is not read.
 
         log = open_log("drive.mcap")
         for entry in log.messages("odometry", start_s=2.0, end_s=4.0):
@@ -176,7 +176,9 @@ def open_log(path: Path | str) -> Log:
 
 
 def recorded_config(reader: LogReader) -> dict[str, dict[str, Any]]:
-    """The configuration that a log was recorded with. Raises LogError where it cannot be read."""
+    """Return the configuration that a log was recorded with. Raises LogError if it cannot be
+    read.
+    """
     try:
         sections = json.loads(reader.about(layout.RECORDING).get("config", "{}"))
     except json.JSONDecodeError as error:

@@ -52,7 +52,7 @@ class Recorder:
     thread, `close()` it.
 
     `about` is kept in the file: the agent, the configuration, what else is to be known of the run.
-    `limit_bytes` may wait to be written. Raises LogError where the file cannot be written.
+    `limit_bytes` may wait to be written. Raises LogError if the file cannot be written.
     """
 
     def __init__(
@@ -84,20 +84,20 @@ class Recorder:
 
     @property
     def received(self) -> Counter[str]:
-        """How many messages of each topic have been written."""
+        """Return how many messages of each topic have been written."""
         return self._intake.received
 
     def open(self) -> None:
         """Join the bus and announce itself: all that is published from now on is recorded."""
         for topic in self._topics:
-            self._bus.subscribe(topic, self._queue.put, self._on_gap)
-        self._bus.watch(self._on_member)
+            self._bus.subscribe(topic, self._queue.put, self.on_gap)
+        self._bus.watch(self.on_member)
         self._bus.announce(Member(MODULE, self._instance))
 
     def pump(self, timeout_s: float | None = 0.0) -> bool:
         """Write the oldest arrival, waiting up to `timeout_s` for one, and flush when it is time.
 
-        Returns whether one came. Raises LogError where the disk takes no more.
+        Returns whether one came. Raises LogError if the disk takes no more.
         """
         due_s = self._flush_timer.due_in_s()
         found = self._take(due_s if timeout_s is None else min(timeout_s, due_s))
@@ -112,60 +112,11 @@ class Recorder:
         while self._take(0.0):
             pass
 
-        summary = self._summary()
-        self._writer.note(layout.SUMMARY, {"json": msgspec.json.encode(summary).decode()})
-        self._writer.close()
-        summary.size_bytes = self.path.stat().st_size
-        return summary
-
-    def abandon(self) -> None:
-        """Leave the bus and write no more: the disk took no more."""
-        self._bus.close()
-
-    def _take(self, timeout_s: float) -> bool:
-        item = self._queue.take(timeout_s)
-        if item is None:
-            return False
-        if isinstance(item, Arrival):
-            self._write(item)
-        else:
-            item()
-        return True
-
-    def _write(self, arrival: Arrival) -> None:
-        message = self._intake.accept(arrival)
-        envelope = arrival.envelope
-        if message is None or envelope is None:
-            return
-
-        topic = arrival.topic
-        self._sequences.follow(topic, envelope)
-        self._writer.write(topic, arrival.payload, envelope, arrival.received_ns)
-
-    def _on_gap(self, topic: str, number: int) -> None:
-        def count() -> None:
-            self._unrecovered[topic] += number
-
-        self._queue.call(count)
-
-    def _on_member(self, member: Member, alive: bool) -> None:
-        self._queue.call(lambda: self._note_member(member, alive))
-
-    def _note_member(self, member: Member, alive: bool) -> None:
-        facts = {
-            "module": member.module,
-            "instance": member.instance,
-            "alive": str(alive).lower(),
-            "at_ns": str(time.time_ns()),
-        }
-        self._writer.note(layout.MEMBER, facts)
-
-    def _summary(self) -> Summary:
         lost = self._sequences.lost()
         dropped = dict(self._queue.dropped)
         incomplete = {*lost, *dropped, *self._unrecovered}
         never_drop = [name for name in incomplete if BY_NAME[name].delivery is Delivery.NEVER_DROP]
-        return Summary(
+        summary = Summary(
             path=str(self.path),
             duration_s=time.monotonic() - self._began_s,
             size_bytes=0,
@@ -178,6 +129,51 @@ class Recorder:
             never_drop_whole=not never_drop,
             queue_peak_mb=self._queue.peak_bytes / 1e6,
         )
+        self._writer.note(layout.SUMMARY, {"json": msgspec.json.encode(summary).decode()})
+        self._writer.close()
+        summary.size_bytes = self.path.stat().st_size
+        return summary
+
+    def abandon(self) -> None:
+        """Leave the bus and write no more: the disk took no more."""
+        self._bus.close()
+
+    def on_gap(self, topic: str, number: int) -> None:
+        """Count messages that the bus has given up."""
+
+        def count() -> None:
+            self._unrecovered[topic] += number
+
+        self._queue.call(count)
+
+    def on_member(self, member: Member, alive: bool) -> None:
+        """Note in the log that a member has come or gone."""
+        facts = {
+            "module": member.module,
+            "instance": member.instance,
+            "alive": str(alive).lower(),
+        }
+
+        def note() -> None:
+            self._writer.note(layout.MEMBER, {**facts, "at_ns": str(time.time_ns())})
+
+        self._queue.call(note)
+
+    def _take(self, timeout_s: float) -> bool:
+        """Write or do what has waited longest; return if there was anything."""
+        item = self._queue.take(timeout_s)
+        if item is None:
+            return False
+        if not isinstance(item, Arrival):
+            item()
+            return True
+
+        message = self._intake.accept(item)
+        envelope = item.envelope
+        if message is not None and envelope is not None:
+            self._sequences.follow(item.topic, envelope)
+            self._writer.write(item.topic, item.payload, envelope, item.received_ns)
+        return True
 
 
 def run(
@@ -185,7 +181,7 @@ def run(
 ) -> Summary:
     """Record until `stop()` is true or the time is over.
 
-    Raises LogError where the disk takes no more; the log then holds what was flushed before.
+    Raises LogError if the disk takes no more; the log then holds what was flushed before.
     """
     recorder.open()
     log.info("recording to %s", recorder.path)

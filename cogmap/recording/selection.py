@@ -13,7 +13,9 @@ from cogmap.schemas.topics import Topic
 
 
 def named(names: Iterable[str]) -> list[Topic]:
-    """The topics of those names. Raises UsageError naming the one that is not in the table."""
+    """Return the topics of those names. Raises UsageError naming the one that is not in the
+    table.
+    """
     found = []
     for name in names:
         if name not in topics.BY_NAME:
@@ -23,7 +25,7 @@ def named(names: Iterable[str]) -> list[Topic]:
 
 
 def pattern(text: str, option: str) -> re.Pattern[str]:
-    """`text` as a regular expression. Raises UsageError naming the option it came from."""
+    """Return `text` as a regular expression. Raises UsageError naming the option it came from."""
     try:
         return re.compile(text)
     except re.error as error:
@@ -31,10 +33,10 @@ def pattern(text: str, option: str) -> re.Pattern[str]:
 
 
 def to_record(names: Iterable[str] = (), regex: str = "", exclude: str = "") -> list[Topic]:
-    """The topics that are named or match `regex`, all of them where neither is given, less those
-    that match `exclude`.
+    """Return the topics that are named or match `regex`, all of them if neither is given, less
+    those that match `exclude`.
 
-    Raises UsageError where nothing is left.
+    Raises UsageError if nothing is left.
     """
     recordable = topics_to_record()
     wanted = set(named(names))

@@ -34,7 +34,7 @@ _decoder = msgspec.msgpack.Decoder(_Numbered)
 class CameraFrame:
     """A camera frame in a log, received `at_s` seconds after the log's first message.
 
-    `percepts` is what was recognised in it, `objects` how many; None and 0 where the log has none.
+    `percepts` is what was recognised in it, `objects` how many; None and 0 if the log has none.
     """
 
     number: int
@@ -48,7 +48,7 @@ class CameraFrame:
 def camera_frames(
     reader: LogReader, topic: Topic, progress: Progress | None = None
 ) -> list[CameraFrame]:
-    """Every frame on `topic`, which carries images, in order. Raises LogError where none is."""
+    """Return every frame on `topic`, which carries images, in order. Raises LogError if none is."""
     images: list[tuple[Record, _Numbered]] = []
     recognised: dict[tuple[int, int], tuple[Record, int]] = {}
     for record in reader.records({topic, topics.PERCEPTS}, progress):
@@ -72,7 +72,7 @@ def camera_frames(
 
 
 def with_percepts(reader: LogReader, frames: list[CameraFrame]) -> list[CameraFrame]:
-    """The frames whose percepts are in the log. Raises LogError where there is none."""
+    """Return the frames whose percepts are in the log. Raises LogError if there is none."""
     found = [frame for frame in frames if frame.percepts is not None]
     if not found:
         kind = f"{topics.PERCEPTS.name} of any of its {len(frames)} frames"
@@ -81,7 +81,7 @@ def with_percepts(reader: LogReader, frames: list[CameraFrame]) -> list[CameraFr
 
 
 def by_number(frames: list[CameraFrame], number: int, path: object) -> CameraFrame:
-    """The first frame with that number. Raises UsageError naming those that there are."""
+    """Return the first frame with that number. Raises UsageError naming those that there are."""
     for frame in frames:
         if frame.number == number:
             return frame
@@ -95,7 +95,7 @@ def by_number(frames: list[CameraFrame], number: int, path: object) -> CameraFra
 
 
 def at_time(frames: list[CameraFrame], at_s: float, reader: LogReader) -> CameraFrame:
-    """The frame nearest to `at_s` into the log. Raises UsageError where the log is shorter."""
+    """Return the frame nearest to `at_s` into the log. Raises UsageError if the log is shorter."""
     if at_s > reader.span_s:
         raise UsageError(
             f"{reader.path} lasts {reader.span_s:.3f} s: choose a time before that, not {at_s:g} s"
@@ -104,7 +104,7 @@ def at_time(frames: list[CameraFrame], at_s: float, reader: LogReader) -> Camera
 
 
 def message(reader: LogReader, record: Record) -> Message:
-    """The message of a record. Raises LogError where it does not fit its topic."""
+    """Return the message of a record. Raises LogError if it does not fit its topic."""
     try:
         return reader.message(record)
     except MessageError as error:
@@ -112,7 +112,7 @@ def message(reader: LogReader, record: Record) -> Message:
 
 
 def percepts(reader: LogReader, frame: CameraFrame) -> Percepts | None:
-    """What was recognised in a frame, None where it is not in the log. Raises LogError."""
+    """Return what was recognised in a frame, None if it is not in the log. Raises LogError."""
     if frame.percepts is None:
         return None
     found = message(reader, frame.percepts)

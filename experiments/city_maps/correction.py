@@ -12,7 +12,7 @@ PLACE_SD_RAD = 0.05
 
 
 def settings(method: str, step_m: float) -> Sections:
-    """The keys of the codelets for one of METHODS; views are `step_m` apart."""
+    """Return the keys of the codelets for one of METHODS; views are `step_m` apart."""
     # The measured length of a step varies: with half of it, each view has its place on the path.
     codelets: dict[str, float | str] = {
         "path_spacing_m": step_m / 2,

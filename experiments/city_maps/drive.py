@@ -13,7 +13,6 @@ from cogmap.experiments import in_memory
 from cogmap.experiments.city_maps.correction import settings
 from cogmap.experiments.city_maps.environment import Environment
 from cogmap.experiments.city_maps.observer import Observer, Traversal
-from cogmap.experiments.city_maps.streets import Points
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
 from cogmap.services import registry
@@ -41,11 +40,22 @@ class Tour:
 
 
 def sections(environment: Environment, tour: Tour, noise: Noise, method: str) -> Sections:
-    """The configuration of every module for one traversal, as for `cogmap run --config`."""
+    """Return the configuration of every module for one traversal, as for `cogmap run --config`."""
     correction = settings(method, SPEED_M_S / FRAME_HZ)
+    line_m = environment.line(tour.start, tour.backward, LEAD_M, OVERRUN_M)
+    landmarks = [
+        {"name": name, "x_m": x_m, "y_m": y_m}
+        for name, (x_m, y_m) in zip(
+            environment.names, environment.buildings_m.tolist(), strict=True
+        )
+    ]
     sim = {
         "seed": tour.seed,
-        "trajectory": _trajectory(environment, tour),
+        "trajectory": {
+            "line_m": line_m.tolist(),
+            "landmarks": landmarks,
+            "speed_m_s": SPEED_M_S,
+        },
         "noise": msgspec.structs.asdict(noise),
         "percepts": {"field_of_view_rad": FIELD_OF_VIEW_RAD},
         "frame_hz": FRAME_HZ,
@@ -61,20 +71,8 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
     }
 
 
-def _trajectory(environment: Environment, tour: Tour) -> dict[str, object]:
-    line_m = environment.line(tour.start, tour.backward, LEAD_M, OVERRUN_M)
-    places_m = environment.buildings_m.tolist()
-    landmarks = []
-
-    for name, (x_m, y_m) in zip(environment.names, places_m, strict=True):
-        landmark = {"name": name, "x_m": x_m, "y_m": y_m}
-        landmarks.append(landmark)
-
-    return {"line_m": line_m.tolist(), "landmarks": landmarks, "speed_m_s": SPEED_M_S}
-
-
 def traverse(configured: Sections) -> Traversal:
-    """Drive one tour to its end. Raises CogmapError where a message was lost or refused."""
+    """Drive one tour to its end. Raises CogmapError if a message was lost or refused."""
     modules = [registry.build(name, configured) for name in MODULES]
     return driven(configured, modules)
 
@@ -84,16 +82,12 @@ def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
     trajectory = configured["sim"]["trajectory"]
     landmarks = trajectory["landmarks"]
     names = tuple(landmark["name"] for landmark in landmarks)
-    origin = _first_pose(trajectory["line_m"])
+
+    # The pose at the beginning of the line, towards its second point.
+    start_m, next_m = np.array(trajectory["line_m"][:2])
+    dx_m, dy_m = next_m - start_m
+    origin = np.append(start_m, math.atan2(dy_m, dx_m))
 
     observer = Observer(origin, names)
     in_memory.run([*modules, observer.module()])
     return observer.traversal()
-
-
-def _first_pose(line_m: Sequence[tuple[float, float]]) -> Points:
-    """(3,): the pose at the beginning of a line, towards its second point."""
-    start_m, next_m = np.array(line_m[:2])
-    dx_m, dy_m = next_m - start_m
-    heading_rad = math.atan2(dy_m, dx_m)
-    return np.append(start_m, heading_rad)

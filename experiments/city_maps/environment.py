@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from cogmap.errors import UsageError
 from cogmap.experiments.city_maps.streets import Points, Streets, shortest_path
@@ -56,11 +55,10 @@ class Environment:
     @property
     def tour_m(self) -> float:
         """The length of the tour."""
-        lengths_m = [_length_m(leg) for leg in self.legs_m]
-        return sum(lengths_m)
+        return float(sum(_step_lengths_m(leg).sum() for leg in self.legs_m))
 
     def line(self, start: int, backward: bool, lead_m: float, overrun_m: float) -> Points:
-        """The tour past building `start`, all others and `start` again.
+        """Return the tour past building `start`, all others and `start` again.
 
         It begins `lead_m` before `start`, so that the building is approached, and ends `overrun_m`
         beyond where it began.
@@ -77,13 +75,18 @@ class Environment:
 
 
 def environments(city: City, number: int, seed: int) -> list[Environment]:
-    """`number` environments of `city`, from seeds of their own.
+    """Return `number` environments of `city`, from seeds of their own.
 
-    Raises UsageError where the city has no eight buildings that lie far enough apart along its
+    Raises UsageError if the city has no eight buildings that lie far enough apart along its
     streets.
     """
     streets = city.streets.connected()
-    usable = _beside_streets(city, streets)
+
+    # Buildings that stand by a street, neither on it nor far away.
+    _, feet_m = streets.nearest(city.buildings_m)
+    distances_m = np.hypot(*(city.buildings_m - feet_m).T)
+    min_m, max_m = FROM_STREET_M
+    usable = np.flatnonzero((distances_m >= min_m) & (distances_m <= max_m))
     found = []
 
     for count in range(number):
@@ -96,21 +99,19 @@ def environments(city: City, number: int, seed: int) -> list[Environment]:
             )
 
         name = city.name if number == 1 else f"{city.name} {count + 1}"
-        found.append(_environment(name, city, streets, chosen))
+        order, legs_m = _tour(streets, city.buildings_m[chosen])
+        in_order = [chosen[place] for place in order]
+        found.append(
+            Environment(
+                name=name,
+                streets=streets,
+                names=tuple(city.names[building] for building in in_order),
+                buildings_m=city.buildings_m[in_order],
+                legs_m=tuple(legs_m),
+            )
+        )
 
     return found
-
-
-def _beside_streets(city: City, streets: Streets) -> Indices:
-    """The buildings that stand by a street, neither on it nor far away."""
-    _, feet_m = streets.nearest(city.buildings_m)
-    offsets_m = city.buildings_m - feet_m
-    distances_m = np.hypot(*offsets_m.T)
-
-    min_m, max_m = FROM_STREET_M
-    is_off_street = distances_m >= min_m
-    is_near = distances_m <= max_m
-    return np.flatnonzero(is_off_street & is_near)
 
 
 def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> list[int] | None:
@@ -131,7 +132,8 @@ def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> l
         room_m = np.maximum(extent_m - side_m, 0)
         lower_m = corner_m + rng.uniform(0, 1, 2) * room_m
 
-        inside = usable[_in_square(usable_m, lower_m, side_m)]
+        is_within = (usable_m >= lower_m) & (usable_m <= lower_m + side_m)
+        inside = usable[is_within.all(axis=1)]
         candidates = rng.permutation(inside).tolist()
         chosen = _apart(buildings_m, candidates, MIN_APART * side_m)
 
@@ -141,17 +143,8 @@ def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> l
     return None
 
 
-def _in_square(positions_m: Points, lower_m: Points, side_m: float) -> npt.NDArray[np.bool_]:
-    """Which of (n, 2) positions lie in a square, by its lower corner (2,)."""
-    upper_m = lower_m + side_m
-    is_above = positions_m >= lower_m
-    is_below = positions_m <= upper_m
-    is_within = is_above & is_below
-    return np.asarray(is_within.all(axis=1))
-
-
 def _apart(buildings_m: Points, candidates: Sequence[int], min_m: float) -> list[int]:
-    """The first BUILDINGS of `candidates` that lie `min_m` from each other, or fewer."""
+    """Return the first BUILDINGS of `candidates` that lie `min_m` from each other, or fewer."""
     chosen: list[int] = []
 
     for candidate in candidates:
@@ -165,22 +158,10 @@ def _apart(buildings_m: Points, candidates: Sequence[int], min_m: float) -> list
     return chosen
 
 
-def _environment(name: str, city: City, streets: Streets, chosen: Sequence[int]) -> Environment:
-    order, legs_m = _tour(streets, city.buildings_m[chosen])
-    in_order = [chosen[place] for place in order]
-    names = [city.names[building] for building in in_order]
-
-    return Environment(
-        name=name,
-        streets=streets,
-        names=tuple(names),
-        buildings_m=city.buildings_m[in_order],
-        legs_m=tuple(legs_m),
-    )
-
-
 def _tour(streets: Streets, buildings_m: Points) -> tuple[list[int], list[Points]]:
-    """The order of the shortest tour past (n, 2) buildings, and its line from each to the next."""
+    """Return the order of the shortest tour past (n, 2) buildings, and its line from each to the
+    next.
+    """
     joined, fronts = streets.with_points(buildings_m)
     distances_m, before = joined.shortest_paths(fronts)
 
@@ -206,16 +187,11 @@ def _joined(lines: Sequence[Points]) -> Points:
 
 
 def _beginning(line_m: Points, length_m: float) -> Points:
-    """The first `length_m` of a line."""
+    """Return the first `length_m` of a line."""
     along_m = distances_along(line_m)
     before_m = line_m[along_m < length_m]
     end_m = interpolate(along_m, line_m, np.array([length_m]))
     return np.vstack([before_m, end_m])
-
-
-def _length_m(line_m: Points) -> float:
-    lengths_m = _step_lengths_m(line_m)
-    return float(lengths_m.sum())
 
 
 def _step_lengths_m(line_m: Points) -> Points:

@@ -55,7 +55,7 @@ def fitted(environments: Sequence[Environment], budget: Budget) -> Noise:
 
 
 def positions_error_km2(job: Job) -> float:
-    """The error of the map of one traversal, positions corrected."""
+    """Return the error of the map of one traversal, positions corrected."""
     configured = configurations(job)["positions"]
     learned_m = traverse(configured).buildings_m
     true_m = job.environment.buildings_m

@@ -66,7 +66,7 @@ class CityMap:
     learned: tuple[Learned, ...]
 
     def error_km2(self, method: str) -> float:
-        """The mean over the traversals."""
+        """Return the mean over the traversals."""
         errors_km2 = [one.error_km2[method] for one in self.learned]
         return float(np.mean(errors_km2))
 
@@ -81,7 +81,7 @@ class CityMap:
 
 
 def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
-    """All environments, the same from the same seed whatever the number of processes."""
+    """Return all environments, the same from the same seed whatever the number of processes."""
     every = jobs(environments, noise, budget.traversals, budget.seed)
     learned = parallel_map(traversed, every, budget.processes, budget.progress)
     maps = []
@@ -98,7 +98,7 @@ def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -
 def jobs(
     environments: Sequence[Environment], noise: Noise, traversals: int, seed: int
 ) -> list[Job]:
-    """All traversals of each environment, one environment after the other."""
+    """Return all traversals of each environment, one environment after the other."""
     found = []
 
     for place, environment in enumerate(environments):
@@ -146,7 +146,7 @@ def configurations(job: Job) -> dict[str, Sections]:
 
 
 def map_error_km2(learned_m: Points, true_m: Points) -> float:
-    """The sum of squared errors of the positions in km^2, as the paper has it.
+    """Return the sum of squared errors of the positions in km^2, as the paper has it.
 
     One that is missing errs as the others do on average; nothing known is NaN.
     """
@@ -162,29 +162,14 @@ def map_error_km2(learned_m: Points, true_m: Points) -> float:
 
 
 def _learned(job: Job, maps: Mapping[str, Traversal]) -> Learned:
-    learned = Learned(
-        error_km2=_errors_km2(maps, job.environment.buildings_m),
+    """Gather the maps of one traversal, by the method that made them."""
+    true_m = job.environment.buildings_m
+    buildings_m = {method: one.buildings_m for method, one in maps.items()}
+    believed_m = buildings_m | maps["none"].alone_m
+    return Learned(
+        error_km2={name: map_error_km2(found, true_m) for name, found in believed_m.items()},
         missing=sum(one.missing for one in maps.values()),
-        buildings_m={},
-        path_m={},
-        road_m={},
+        buildings_m=buildings_m,
+        path_m={method: one.path_m for method, one in maps.items()},
+        road_m={method: one.road_m for method, one in maps.items()},
     )
-
-    for method, one in maps.items():
-        learned.buildings_m[method] = one.buildings_m
-        learned.path_m[method] = one.path_m
-        learned.road_m[method] = one.road_m
-
-    return learned
-
-
-def _errors_km2(maps: Mapping[str, Traversal], true_m: Points) -> dict[str, float]:
-    errors_km2 = {}
-
-    for method, one in maps.items():
-        errors_km2[method] = map_error_km2(one.buildings_m, true_m)
-
-    for name, buildings_m in maps["none"].alone_m.items():
-        errors_km2[name] = map_error_km2(buildings_m, true_m)
-
-    return errors_km2

@@ -22,61 +22,38 @@ NAMES = {
     "heading": "corrected",
 }
 CAMERA_NAMES = NAMES | {FUSED: "fused_alone"}
-RATIOS = ("corrected", "positions")
 Errors = npt.NDArray[np.float64]
 Metrics = dict[str, float | str]
 
 
 def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
-    """Every metric that is printed or drawn.
+    """Return every metric that is printed or drawn.
 
     `error_corrected_over_uncorrected` is the mean over the maps of each one's ratio of mean errors.
     Corrected is with headings, beyond the paper; `positions` is the paper's own rule. Uncorrected
     is the map of an agent that recognises landmarks but closes no loops; `wheels_alone` the map by
     path integration alone, which without images is that of the wheels.
     """
-    errors = {}
-    for method, name in NAMES.items():
-        errors_km2 = [city.error_km2(method) for city in maps]
-        errors[name] = np.array(errors_km2)
-
-    metrics = _ratios(errors) | _errors(maps, errors) | _protocol(maps, noise)
-    for number, city in enumerate(maps, start=1):
-        prefix = f"map_{number:02d}"
-        metrics |= _of_map(prefix, city)
-
-    return metrics
-
-
-def _errors(maps: Sequence[CityMap], errors: dict[str, Errors]) -> Metrics:
     metrics: Metrics = {}
+    errors_km2 = {}
+    for method, name in NAMES.items():
+        errors_km2[name] = np.array([city.error_km2(method) for city in maps])
 
-    for name, values_km2 in errors.items():
+    for name in ("corrected", "positions"):
+        ratio = errors_km2[name] / errors_km2["uncorrected"]
+        metrics[f"error_{name}_over_uncorrected"] = float(ratio.mean())
+    over_wheels = errors_km2["corrected"] / errors_km2["wheels_alone"]
+    metrics["error_corrected_over_wheels_alone"] = float(over_wheels.mean())
+
+    for name, values_km2 in errors_km2.items():
         metrics[f"error_{name}_km2"] = float(values_km2.mean())
         metrics[f"error_{name}_sd_km2"] = float(values_km2.std())
         metrics[f"growth_{name}_km2_per_km"] = growth(maps, values_km2)
 
-    return metrics
-
-
-def _ratios(errors: dict[str, Errors]) -> Metrics:
-    metrics: Metrics = {}
-
-    for name in RATIOS:
-        ratio = errors[name] / errors["uncorrected"]
-        metrics[f"error_{name}_over_uncorrected"] = float(ratio.mean())
-
-    over_wheels = errors["corrected"] / errors["wheels_alone"]
-    metrics["error_corrected_over_wheels_alone"] = float(over_wheels.mean())
-    return metrics
-
-
-def _protocol(maps: Sequence[CityMap], noise: Noise) -> Metrics:
-    missing = sum(one.missing for city in maps for one in city.learned)
-    return {
+    metrics |= {
         "maps": float(len(maps)),
         "traversals": float(len(maps[0].learned)),
-        "buildings_missing": float(missing),
+        "buildings_missing": float(sum(one.missing for city in maps for one in city.learned)),
         "noise_speed": noise.speed,
         "noise_turn": noise.turn,
         "noise_drift_rad_per_sqrt_m": noise.drift_rad_per_sqrt_m,
@@ -88,22 +65,19 @@ def _protocol(maps: Sequence[CityMap], noise: Noise) -> Metrics:
         "self_motion": "wheels",
     }
 
-
-def _of_map(prefix: str, city: CityMap) -> Metrics:
-    metrics: Metrics = {
-        f"{prefix}_name": city.environment.name,
-        f"{prefix}_area_km2": city.environment.area_km2,
-        f"{prefix}_tour_km": city.environment.tour_m / 1e3,
-    }
-
-    for method, name in NAMES.items():
-        metrics[f"{prefix}_error_{name}_km2"] = city.error_km2(method)
+    for number, city in enumerate(maps, start=1):
+        prefix = f"map_{number:02d}"
+        metrics[f"{prefix}_name"] = city.environment.name
+        metrics[f"{prefix}_area_km2"] = city.environment.area_km2
+        metrics[f"{prefix}_tour_km"] = city.environment.tour_m / 1e3
+        for method, name in NAMES.items():
+            metrics[f"{prefix}_error_{name}_km2"] = city.error_km2(method)
 
     return metrics
 
 
 def camera_metrics(drawn: Learned, percepts: Learned) -> Metrics:
-    """Those of one traversal with cameras, and of the same one at percept level.
+    """Return the metrics of one traversal with cameras, and of the same one at percept level.
 
     With cameras self-motion is fused: `fused_alone` is path integration of that alone.
     """
@@ -125,7 +99,9 @@ def camera_metrics(drawn: Learned, percepts: Learned) -> Metrics:
 
 
 def growth(maps: Sequence[CityMap], errors_km2: Errors) -> float:
-    """By how many km^2 the error grows for a kilometre of tour: a line's slope, 0 for one map."""
+    """Return by how many km^2 the error grows for a kilometre of tour: a line's slope, 0 for one
+    map.
+    """
     length_km = np.array([city.environment.tour_m / 1e3 for city in maps])
     centred_km = length_km - length_km.mean()
     variation = float(centred_km @ centred_km)

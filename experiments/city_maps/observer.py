@@ -41,7 +41,7 @@ class Traversal:
 
     @property
     def missing(self) -> int:
-        """How many buildings are not on the map."""
+        """Return how many buildings are not on the map."""
         is_missing = np.isnan(self.buildings_m[:, 0])
         return int(is_missing.sum())
 
@@ -61,33 +61,39 @@ class Observer:
         self._true: list[Pose] = []
 
     def module(self) -> Module:
-        """The module `observer`."""
+        """Build the module `observer`."""
         return (
             Module("observer")
-            .on(topics.DELTA, self._on_delta)
-            .on(topics.TRUE_POSE, self._on_pose)
+            .on(topics.DELTA, self.on_delta)
+            .on(topics.TRUE_POSE, self.on_pose)
             .on(topics.ODOMETRY, self._wheels.on_odometry)
         )
 
     def traversal(self) -> Traversal:
-        """All that was observed."""
+        """Return all that was observed."""
         believed = np.array(self._believed)
-        true = np.array(self._true)
         path = reading.path_rows(self._graph)
-        path_m = path[:, reading.POSE][:, :2]
-        buildings_m = reading.object_positions_m(self._graph, self._names)
-        road_m = reading.road_m(self._graph)
 
+        # By path integration alone: without images, self-motion is that of the wheels.
+        fused = path[:, reading.ODOMETRY].copy()
+        fused[:, :2] -= fused[0, :2] - path[0, reading.POSE][:2]
+        alone_m = {WHEELS: self._seen_from(fused)}
+        if self._wheels:
+            wheels = self._wheels.poses(path[:, reading.STAMP])
+            alone_m = {WHEELS: self._seen_from(wheels), FUSED: alone_m[WHEELS]}
+
+        heading_rad = believed[:, 2] + self._origin[2]
         return Traversal(
-            believed=self._placed_poses(believed),
-            true=true[: len(believed)],
-            path_m=self._placed(path_m),
-            buildings_m=self._placed(buildings_m),
-            road_m=self._placed(road_m),
-            alone_m=self._alone_m(path),
+            believed=np.column_stack([self._placed(believed[:, :2]), heading_rad]),
+            true=np.array(self._true)[: len(believed)],
+            path_m=self._placed(path[:, reading.POSE][:, :2]),
+            buildings_m=self._placed(reading.object_positions_m(self._graph, self._names)),
+            road_m=self._placed(reading.road_m(self._graph)),
+            alone_m=alone_m,
         )
 
-    def _on_delta(self, delta: Delta) -> None:
+    def on_delta(self, delta: Delta) -> None:
+        """Follow the graph, and keep each estimate. Raises CogmapError if a delta is missing."""
         if not self._graph.apply(delta):
             raise CogmapError(f"delta {delta.version} is not the next one")
 
@@ -95,32 +101,14 @@ class Observer:
             pose = reading.self_pose(self._graph)
             self._believed.append(pose)
 
-    def _on_pose(self, true: TruePose) -> None:
+    def on_pose(self, true: TruePose) -> None:
+        """Keep the true pose of each view."""
         pose = true.pose
         self._true.append((pose.x_m, pose.y_m, pose.heading_rad))
 
-    def _alone_m(self, path: Points) -> dict[str, Points]:
-        """The buildings (8, 2) by path integration alone, in the true frame.
-
-        Without images self-motion is that of the wheels.
-        """
-        fused = path[:, reading.ODOMETRY].copy()
-        start_m = path[0, reading.POSE][:2]
-        shift_m = fused[0, :2] - start_m
-        fused[:, :2] -= shift_m
-        fused_m = self._seen_from(fused)
-
-        if not self._wheels:
-            return {WHEELS: fused_m}
-
-        stamps_s = path[:, reading.STAMP]
-        wheels = self._wheels.poses(stamps_s)
-        wheels_m = self._seen_from(wheels)
-        return {WHEELS: wheels_m, FUSED: fused_m}
-
     def _seen_from(self, poses: Points) -> Points:
-        """(8, 2): the median of all observations of each building, from `poses` of the path, in the
-        true frame.
+        """Return the median of all observations of each building, (8, 2), from `poses` of the path,
+        in the true frame.
         """
         seen = reading.observations(self._graph)
         where_m = transform_from(poses[seen.place], seen.where_m)
@@ -135,11 +123,5 @@ class Observer:
         return self._placed(buildings_m)
 
     def _placed(self, own_m: Points) -> Points:
-        """(n, 2) positions of the agent's own frame, in the true one."""
+        """Return (n, 2) positions of the agent's own frame in the true one."""
         return transform_from(self._origin, own_m)
-
-    def _placed_poses(self, own: Points) -> Points:
-        """(n, 3) poses of the agent's own frame, in the true one."""
-        positions_m = self._placed(own[:, :2])
-        heading_rad = own[:, 2] + self._origin[2]
-        return np.column_stack([positions_m, heading_rad])

@@ -38,8 +38,8 @@ Point = TypeVar("Point", bound=Hashable)
 
 
 def from_osm(path: Path) -> City:
-    """The streets and buildings of an extract. Raises UsageError where it lacks either, or a line
-    is wrong.
+    """Return the streets and buildings of an extract. Raises UsageError if it lacks either, or a
+    line is wrong.
     """
     extract = osm.read(path)
     streets = streets_of(extract, path)
@@ -48,7 +48,7 @@ def from_osm(path: Path) -> City:
 
 
 def streets_of(extract: Extract, path: Path) -> Streets:
-    """The streets of the extract in a file. Raises UsageError where there are none."""
+    """Return the streets of the extract in a file. Raises UsageError if there are none."""
     ways = [
         way
         for way in extract.ways
@@ -72,7 +72,9 @@ def middle_of(extract: Extract) -> Points:
 
 
 def from_street_graph(graph: StreetGraph, seed: int) -> City:
-    """A city of real streets, which has no buildings: houses are put along them, from a seed."""
+    """Return a city of real streets, which has no buildings: houses are put along them, from a
+    seed.
+    """
     middle = continuous(np.array(graph.nodes_lonlat)).mean(axis=0)
     lines = [graph.line(edge) for edge in graph.edges]
     lonlat, pieces = _pieces(lines)
@@ -84,8 +86,8 @@ def from_street_graph(graph: StreetGraph, seed: int) -> City:
 
 
 def folder(path: Path, seed: int) -> list[City]:
-    """Every city in a folder, in the order of the files' names. Raises UsageError where there is
-    none.
+    """Return every city in a folder, in the order of the files' names. Raises UsageError if there
+    is none.
     """
     if not path.is_dir():
         raise UsageError(f"there is no folder {path}")
@@ -107,8 +109,8 @@ def folder(path: Path, seed: int) -> list[City]:
 
 
 def grown(seed: int) -> City:
-    """A city from a seed: a bent grid of blocks of many sizes, some streets missing, houses along
-    the others.
+    """Return a city from a seed: a bent grid of blocks of many sizes, some streets missing, houses
+    along the others.
     """
     rng = np.random.default_rng([seed, 0xC17])
     points_m = _bent_grid_m(rng)
@@ -123,7 +125,7 @@ def grown(seed: int) -> City:
 
 
 def grown_environments(number: int, seed: int) -> list[Environment]:
-    """`number` environments, each of a city grown from a seed of its own."""
+    """Return `number` environments, each of a city grown from a seed of its own."""
     found = []
 
     for count in range(number):
@@ -148,7 +150,7 @@ def _bent_grid_m(rng: np.random.Generator) -> Points:
 
 
 def _with_houses(name: str, streets: Streets, rng: np.random.Generator) -> City:
-    """A city with houses on both sides of every street."""
+    """Return a city with houses on both sides of every street."""
     houses_m = []
 
     for start_m, end_m in streets.points_m[streets.pieces]:
@@ -178,7 +180,9 @@ def _along(start_m: Points, end_m: Points, rng: np.random.Generator) -> Points:
 
 
 def _pieces(lines: Iterable[Sequence[Point]]) -> tuple[list[Point], Indices]:
-    """The different points of all lines, and the pieces (m, 2) between them, by their numbers."""
+    """Return the different points of all lines, and the pieces (m, 2) between them, by their
+    numbers.
+    """
     number: dict[Point, int] = {}
     pieces = []
 
@@ -193,8 +197,8 @@ def _pieces(lines: Iterable[Sequence[Point]]) -> tuple[list[Point], Indices]:
 
 
 def _buildings(extract: Extract) -> tuple[tuple[str, ...], Points]:
-    """What people would know by name first: named places and buildings; where these are few, any
-    building.
+    """Return what people would know by name first: named places and buildings; if these are few,
+    any building.
     """
     named: dict[str, LonLat] = {}
     unnamed: dict[str, LonLat] = {}
@@ -227,7 +231,7 @@ def _is_known(tags: Tags) -> bool:
 
 
 def name_of(path: Path) -> str:
-    """The name of a city, by that of its file."""
+    """Return the name of a city, by that of its file."""
     name = path.name
 
     for suffix in sorted(osm.SUFFIXES, key=len, reverse=True):

@@ -34,7 +34,7 @@ class Streets:
         return float(lengths_m.sum())
 
     def connected(self) -> Streets:
-        """The largest part in which each point can be reached from every other."""
+        """Return the largest part in which each point can be reached from every other."""
         _, part = connected_components(self._graph(), directed=False)
         largest = np.bincount(part).argmax()
         is_kept = part == largest
@@ -45,7 +45,9 @@ class Streets:
         return Streets(self.points_m[is_kept], numbers[pieces])
 
     def nearest(self, positions_m: Points) -> tuple[Indices, Points]:
-        """The piece nearest to each of (k, 2) positions, and the nearest point on it, (k, 2)."""
+        """Return the piece nearest to each of (k, 2) positions, and the nearest point on it, (k,
+        2).
+        """
         starts_m, ends_m = self._ends_m()
         pieces = []
         feet_m = []
@@ -58,7 +60,8 @@ class Streets:
         return np.concatenate(pieces), np.concatenate(feet_m)
 
     def with_points(self, positions_m: Points) -> tuple[Streets, Indices]:
-        """The network with a point of its own where each of (k, 2) positions is nearest to it.
+        """Return the network with a point of its own where each of (k, 2) positions is nearest to
+        it.
 
         Returns those points' numbers too. The pieces that are cut are replaced.
         """
@@ -78,8 +81,8 @@ class Streets:
         return Streets(points_m, np.array(pieces, np.intp)), numbers
 
     def shortest_paths(self, from_points: Indices) -> tuple[Points, Indices]:
-        """Distances along the streets from each of k points to all, (k, n), infinite where there is
-        no path, and the point before each on the shortest path, (k, n).
+        """Return distances along the streets from each of k points to all, (k, n), infinite if
+        there is no path, and the point before each on the shortest path, (k, n).
         """
         distances_m, before = dijkstra(
             self._graph(), directed=False, indices=from_points, return_predecessors=True
@@ -112,7 +115,7 @@ class Streets:
 
 
 def _cut(points_m: Points, start: int, end: int, on_it: Indices) -> Iterable[tuple[int, int]]:
-    """The pieces into which points `on_it` cut the piece from `start` to `end`."""
+    """Return the pieces into which points `on_it` cut the piece from `start` to `end`."""
     offsets_m = points_m[on_it] - points_m[start]
     distances_m = np.hypot(*offsets_m.T)
     order = np.argsort(distances_m, kind="stable")
@@ -122,7 +125,7 @@ def _cut(points_m: Points, start: int, end: int, on_it: Indices) -> Iterable[tup
 
 
 def shortest_path(before: Indices, end: int) -> list[int]:
-    """The points of the shortest path to `end`, by a row of `Streets.shortest_paths`."""
+    """Return the points of the shortest path to `end`, by a row of `Streets.shortest_paths`."""
     path = []
     point = end
 

@@ -19,7 +19,7 @@ def shortest_tour(distance: Matrix) -> tuple[float, list[int]]:
     """Length and order, beginning with 0, of the shortest closed tour by (n, n) symmetric
     distances, n at most 12.
 
-    Raises CogmapError where some cannot be reached.
+    Raises CogmapError if some cannot be reached.
     """
     count = len(distance)
     if count < 2:
@@ -32,11 +32,19 @@ def shortest_tour(distance: Matrix) -> tuple[float, list[int]]:
     if not np.isfinite(length):
         raise CogmapError("no tour: some of the buildings cannot be reached from the others")
 
-    return length, _order(best, _set_of(stops), last)
+    visited = _set_of(stops)
+    order = []
+    while last:
+        order.append(last)
+        _, before = best[visited, last]
+        visited &= ~(1 << last)
+        last = before
+
+    return length, [0, *reversed(order)]
 
 
 def _best_paths(distance: Matrix) -> Paths:
-    """The shortest path from 0 through each set of stops, for each that may be its last."""
+    """Return the shortest path from 0 through each set of stops, for each that may be its last."""
     stops = range(1, len(distance))
     best: Paths = {}
 
@@ -54,8 +62,8 @@ def _best_paths(distance: Matrix) -> Paths:
 
 
 def _extended(best: Paths, visited: Sequence[int], onward: Matrix) -> tuple[float, int]:
-    """The shortest path through the stops `visited` and on to one more, `onward` (n,) from each:
-    its length, and the stop before the last.
+    """Return the shortest path through the stops `visited` and on to one more, `onward` (n,) from
+    each: its length, and the stop before the last.
     """
     paths = []
 
@@ -67,18 +75,5 @@ def _extended(best: Paths, visited: Sequence[int], onward: Matrix) -> tuple[floa
 
 
 def _set_of(stops: Iterable[int]) -> int:
-    """A set of stops, a bit each."""
+    """Return a set of stops, a bit each."""
     return sum(1 << stop for stop in stops)
-
-
-def _order(best: Paths, visited: int, last: int) -> list[int]:
-    """The stops of the best path through `visited` that ends in `last`, from 0 on."""
-    order = []
-
-    while last:
-        order.append(last)
-        _, before = best[visited, last]
-        visited &= ~(1 << last)
-        last = before
-
-    return [0, *reversed(order)]

@@ -17,7 +17,7 @@ SHARES = 201
 
 
 def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
-    """Where the post was put, relative to where it stood: (n, 2) metres, along and inward.
+    """Return where the post was put, relative to where it stood: (n, 2) metres, along and inward.
 
     Along is the direction in which turned landmarks move the target, whether or not they did,
     inward is across it, on the side of post 8: trials of every route, and of landmarks turned
@@ -27,23 +27,14 @@ def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
     placed_m = np.array([response.position for response in responses])
     offsets_m = placed_m - targets_m
 
-    along, inward = _directions(trials)
+    turned_m = np.array([trial.turned_target for trial in trials])
+    shifts_m = turned_m - targets_m
+    along = shifts_m / np.hypot(*shifts_m.T)[:, None]
+    left = np.column_stack([-along[:, 1], along[:, 0]])
+    inward = left * np.array([[trial.side] for trial in trials])
     along_m = (offsets_m * along).sum(axis=1)
     inward_m = (offsets_m * inward).sum(axis=1)
     return np.column_stack([along_m, inward_m])
-
-
-def _directions(trials: Sequence[Trial]) -> tuple[Points, Points]:
-    """Unit vectors (n, 2) along and inward, as `errors` has them."""
-    targets_m = np.array([trial.target for trial in trials])
-    turned_m = np.array([trial.turned_target for trial in trials])
-    shifts_m = turned_m - targets_m
-    distances_m = np.hypot(*shifts_m.T)
-    along = shifts_m / distances_m[:, None]
-
-    left = np.column_stack([-along[:, 1], along[:, 0]])
-    sides = np.array([[trial.side] for trial in trials])
-    return along, left * sides
 
 
 def turned_errors(errors_m: Points, shift: float) -> Points:
@@ -56,7 +47,7 @@ def turned_errors(errors_m: Points, shift: float) -> Points:
 
 
 def shift_m(trials: Sequence[Trial]) -> float:
-    """How far turned landmarks move the target."""
+    """Return how far turned landmarks move the target."""
     distances_m = []
     for trial in trials:
         distances_m.append(math.dist(trial.turned_target, trial.target))
@@ -65,22 +56,22 @@ def shift_m(trials: Sequence[Trial]) -> float:
 
 
 def sd_m(errors_m: Points) -> float:
-    """The standard deviation in the plane about the mean of (n, 2) errors."""
+    """Return the standard deviation in the plane about the mean of (n, 2) errors."""
     variances_m2 = errors_m.var(axis=0, ddof=1)
     variance_m2 = variances_m2.sum()
     return float(np.sqrt(variance_m2))
 
 
 def rmse_m(errors_m: Points) -> float:
-    """The root mean squared distance from where the post stood."""
+    """Return the root mean squared distance from where the post stood."""
     squared_m2 = (errors_m**2).sum(axis=1)
     mean_m2 = squared_m2.mean()
     return float(np.sqrt(mean_m2))
 
 
 def lost(errors_m: Points) -> int:
-    """How many responses lie where no normal distribution has any: FAR times the median distance
-    from the median.
+    """Return how many responses lie where no normal distribution has any: FAR times the median
+    distance from the median.
     """
     offsets_m = errors_m - np.median(errors_m, axis=0)
     distances_m = np.hypot(*offsets_m.T)
@@ -91,14 +82,14 @@ def lost(errors_m: Points) -> int:
 
 
 def landmark_weight(self_motion_sd_m: float, landmarks_sd_m: float) -> float:
-    """What landmarks weigh in the optimal combination."""
+    """Return what landmarks weigh in the optimal combination."""
     self_motion_m2 = self_motion_sd_m**2
     landmarks_m2 = landmarks_sd_m**2
     return self_motion_m2 / (landmarks_m2 + self_motion_m2)
 
 
 def optimal_sd_m(self_motion_sd_m: float, landmarks_sd_m: float) -> float:
-    """The standard deviation of the optimal combination of two independent cues."""
+    """Return the standard deviation of the optimal combination of two independent cues."""
     weight = landmark_weight(self_motion_sd_m, landmarks_sd_m)
     by_landmarks_m = weight * landmarks_sd_m
     by_self_motion_m = (1 - weight) * self_motion_sd_m
@@ -120,7 +111,7 @@ class Gaussian:
         return cls(mean_m, covariance_m2)
 
     def log_density(self, points_m: Points) -> Points:
-        """The log of the density at (n, 2) points."""
+        """Return the log of the density at (n, 2) points."""
         offsets_m = points_m - self.mean_m
         precision = np.linalg.inv(self.covariance_m2)
         mahalanobis2 = np.einsum("ni,ij,nj->n", offsets_m, precision, offsets_m)
@@ -131,7 +122,9 @@ class Gaussian:
 
 
 def combined(first: Gaussian, second: Gaussian) -> Gaussian:
-    """The optimal combination, direction by direction: precisions add, means weigh by them."""
+    """Return the optimal combination, direction by direction: precisions add, means weigh by
+    them.
+    """
     first_precision = np.linalg.inv(first.covariance_m2)
     second_precision = np.linalg.inv(second.covariance_m2)
     precision = first_precision + second_precision
@@ -146,7 +139,7 @@ def combined(first: Gaussian, second: Gaussian) -> Gaussian:
 def alternation_log_densities(
     conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian, landmarks_share: float
 ) -> Points:
-    """The log densities (n,) of conflict errors where each response follows one cue alone:
+    """Return the log densities (n,) of conflict errors where each response follows one cue alone:
     landmarks in that share.
     """
     shares = [landmarks_share, 1 - landmarks_share]
@@ -163,7 +156,7 @@ def alternation_log_densities(
 def best_alternation_log_likelihood(
     conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian
 ) -> float:
-    """The same, with the share that makes it most."""
+    """Return the same, with the share that makes it most."""
     likelihoods = []
 
     for share in np.linspace(0.0, 1.0, SHARES).tolist():

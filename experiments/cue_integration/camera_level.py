@@ -18,12 +18,12 @@ from cogmap.experiments.cue_integration import senses
 from cogmap.experiments.cue_integration.geometry import POSTS, START, Point
 from cogmap.experiments.cue_integration.room import Room
 from cogmap.experiments.cue_integration.run import Session, respond
-from cogmap.experiments.cue_integration.trial import Condition, Noise, Response, Trial
+from cogmap.experiments.cue_integration.trial import Condition, Noise, Trial
 from cogmap.experiments.rendered import named
 from cogmap.parallel import Progress
 from cogmap.robot import calibration
 from cogmap.schemas import sensing
-from cogmap.schemas.sensing import Odometry, Percept, Percepts, StereoFrame, View
+from cogmap.schemas.sensing import Odometry, Percept, Percepts, View
 from cogmap.services import registry
 from cogmap.services.sim.layout import roadside
 from cogmap.services.sim.rendering.camera import StereoCamera
@@ -52,49 +52,44 @@ class PicturedRoom(Room):
         self._world.close()
 
     def _seen(self, picked: Mapping[str, Point]) -> list[Percept]:
-        """The buildings around that are recognised, if it is light, and what is being picked up."""
-        recognised = self._around() if self._are_lit else []
-        touched = senses.sightings(self._pose, picked, self._trial.noise, self._rng)
-        return [*recognised, *touched]
-
-    def _around(self) -> list[Percept]:
-        """Each building once, as in the picture that shows it best: whole, and in the middle."""
-        if self._drawn != self._landmarks:
-            self._redraw()
+        """Return the buildings around that are recognised, if it is light, each as in the picture
+        that shows it best, whole and in the middle; and what is being picked up.
+        """
+        best: dict[str, Percept] = {}
+        if self._are_lit and self._drawn != self._landmarks:
+            self._world.close()
+            self._drawn = self._landmarks
+            self._world, self._camera = self._open()
 
         qualities: dict[str, tuple[bool, float]] = {}
-        best: dict[str, Percept] = {}
-
-        for look in range(LOOKS):
+        for look in range(LOOKS if self._are_lit else 0):
             turn_rad = math.tau * look / LOOKS
             for percept in self._look(turn_rad):
                 label = percept.label
                 quality = (percept.whole, -abs(percept.bearing_rad))
-                is_better = label not in best or quality > qualities[label]
-                if is_better:
+                if label not in best or quality > qualities[label]:
                     qualities[label] = quality
                     best[label] = _turned(percept, turn_rad)
 
-        return list(best.values())
+        touched = senses.sightings(self._pose, picked, self._trial.noise, self._rng)
+        return [*best.values(), *touched]
 
     def _look(self, turn_rad: float) -> list[Percept]:
-        """What is recognised with the participant's head turned to the left."""
+        """Return what sensory memory and EPAM recognise with the participant's head turned to the
+        left.
+        """
         self._looks += 1
         stamp_ns = self._looks * LOOK_NS
-        self._world.place_robot(self._drawn_pose(turn_rad))
+        x_m, y_m = _scaled(self._pose.position)
+        heading_rad = self._pose.heading_rad + turn_rad
+        self._world.place_robot(sensing.Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad))
 
         standing = Odometry(
             stamp_ns=stamp_ns, speed_m_s=0.0, turn_rate_rad_s=0.0, dt_s=LOOK_NS / 1e9
         )
         self._sensory.feed(standing)
-        frame = self._camera.frame(stamp_ns, self._looks)
-        return self._recognised(frame)
-
-    def _recognised(self, frame: StereoFrame) -> list[Percept]:
-        """What sensory memory and EPAM make of a frame."""
         percepts: list[Percept] = []
-
-        for view in self._sensory.feed(frame):
+        for view in self._sensory.feed(self._camera.frame(stamp_ns, self._looks)):
             if not isinstance(view, View):
                 continue
             for message in self._epam.feed(view):
@@ -102,18 +97,6 @@ class PicturedRoom(Room):
                     percepts += message.objects
 
         return percepts
-
-    def _drawn_pose(self, turn_rad: float) -> sensing.Pose:
-        """Where the participant stands in the room that is drawn, its head turned to the left."""
-        x_m, y_m = _scaled(self._pose.position)
-        heading_rad = self._pose.heading_rad + turn_rad
-        return sensing.Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
-
-    def _redraw(self) -> None:
-        """Draw the landmarks where they are now."""
-        self._world.close()
-        self._drawn = self._landmarks
-        self._world, self._camera = self._open()
 
     def _open(self) -> tuple[World, StereoCamera]:
         places = []
@@ -131,16 +114,22 @@ class PicturedRoom(Room):
 
 
 def metrics(noise: Noise, seed: int, progress: Progress) -> dict[str, float]:
-    """The error of the response in one trial of each condition with cameras, and in the same with
-    percepts that are not drawn.
+    """Return the error of the response in one trial of each condition with cameras, and in the same
+    with percepts that are not drawn.
     """
     found: dict[str, float] = {}
 
     for done, condition in enumerate(Condition, start=1):
         trial = Trial(condition, 0, noise, seed)
         name = condition.value
-        drawn_m = _error_m(trial, _respond(trial))
-        percepts_m = _error_m(trial, respond(trial))
+        session = Session(trial, PicturedRoom)
+        try:
+            drawn = session.run()
+        finally:
+            session.room.close()
+
+        drawn_m = math.dist(drawn.position, trial.target)
+        percepts_m = math.dist(respond(trial).position, trial.target)
 
         found[f"cameras_error_{name}_m"] = drawn_m
         found[f"cameras_same_trial_by_percepts_error_{name}_m"] = percepts_m
@@ -149,26 +138,13 @@ def metrics(noise: Noise, seed: int, progress: Progress) -> dict[str, float]:
     return found
 
 
-def _respond(trial: Trial) -> Response:
-    session = Session(trial, PicturedRoom)
-
-    try:
-        return session.run()
-    finally:
-        session.room.close()
-
-
-def _error_m(trial: Trial, response: Response) -> float:
-    return math.dist(response.position, trial.target)
-
-
 def _scaled(point: Point) -> Point:
     x_m, y_m = point
     return SCALE * x_m, SCALE * y_m
 
 
 def _turned(percept: Percept, turn_rad: float) -> Percept:
-    """A building seen with the head turned, as a landmark of the room."""
+    """Return a building seen with the head turned, as a landmark of the room."""
     return msgspec.structs.replace(
         percept,
         bearing_rad=math.remainder(percept.bearing_rad + turn_rad, math.tau),

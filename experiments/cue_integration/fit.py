@@ -16,8 +16,8 @@ FACTORS = (1.2, 1.1)
 def coordinate_descent(
     cost: Callable[[Noise], float], noise: Noise, factors: tuple[float, ...] = FACTORS
 ) -> Noise:
-    """The noise that no step up or down in speed or in turn alone betters, steps growing finer by
-    `factors`.
+    """Return the noise that no step up or down in speed or in turn alone betters, steps growing
+    finer by `factors`.
 
     `cost` must be the same for the same noise.
     """
@@ -28,7 +28,9 @@ def coordinate_descent(
         while improved:
             improved = False
             for name in ("speed", "turn"):
-                for tried in _steps(noise, name, factor):
+                for step in (factor, 1 / factor):
+                    changed = {name: getattr(noise, name) * step}
+                    tried = msgspec.structs.replace(noise, **changed)
                     found = cost(tried)
                     if found < lowest:
                         noise = tried
@@ -37,15 +39,3 @@ def coordinate_descent(
                         break
 
     return noise
-
-
-def _steps(noise: Noise, name: str, factor: float) -> list[Noise]:
-    """`noise` with one of its values a step up, and a step down."""
-    value = getattr(noise, name)
-    steps = []
-
-    for step in (factor, 1 / factor):
-        changed = {name: value * step}
-        steps.append(msgspec.structs.replace(noise, **changed))
-
-    return steps

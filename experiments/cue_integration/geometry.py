@@ -81,7 +81,7 @@ class Pose:
 
 
 def step(bearing_rad: float, distance_m: float) -> tuple[float, float]:
-    """The next movement, until a goal is within reach: a turn, and a distance forward.
+    """Return the next movement, until a goal is within reach: a turn, and a distance forward.
 
     The distance is short while the goal is not yet ahead.
     """
@@ -97,8 +97,8 @@ def step(bearing_rad: float, distance_m: float) -> tuple[float, float]:
 def turned(
     points: tuple[Point, ...], angle_rad: float, about: Point = POSTS[8]
 ) -> tuple[Point, ...]:
-    """`points` turned counter-clockwise about another; by 15° about post 8, the targets move 0.457
-    m.
+    """Return `points` turned counter-clockwise about another; by 15° about post 8, the targets move
+    0.457 m.
     """
     cos = math.cos(angle_rad)
     sin = math.sin(angle_rad)

@@ -13,7 +13,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.base import Scalar
 from cogmap.schemas.cognition import Action
 from cogmap.schemas.graph import Delta, Phase
-from cogmap.schemas.nodes import Object, Percept, Self, object_id
+from cogmap.schemas.nodes import Object, Percept, object_id
 
 POSTS_CARRIED = 3
 NEAR_M = 0.1
@@ -41,7 +41,9 @@ class Participant:
         self._has_stopped = False
 
     def on_delta(self, delta: Delta) -> Action | None:
-        """An action for each cycle that has ended. Raises MessageError where a delta is missing."""
+        """Choose an action for each cycle that has ended. Raises MessageError if a delta is
+        missing.
+        """
         if not self._graph.apply(delta):
             raise MessageError(
                 f"delta {delta.version} after version {self._graph.version}: a commit is missing"
@@ -49,12 +51,19 @@ class Participant:
         if delta.phase is not Phase.END or self._has_stopped:
             return None
 
-        pose = self._pose()
+        agent = self._graph.agent
+        if agent is None:
+            raise MessageError("the graph has no self node")
+        pose = Pose(agent.x_m, agent.y_m, agent.heading_rad)
+
+        # A post is carried from now on, and it is kept in mind where it was: the map may not have
+        # it.
         for node in self._graph.of_kind(Percept):
             if node.label.startswith("post-"):
-                self._pick_up(node, pose)
+                there = pose.after(node.bearing_rad, node.range_m)
+                self._carried.setdefault(node.label, there.position)
 
-        scheme, parameters = self._choose(pose)
+        scheme, parameters = self._choose(pose, agent.heading_sd_rad)
         return Action(
             stamp_ns=delta.stamp_ns,
             cycle=delta.cycle,
@@ -63,26 +72,10 @@ class Participant:
             parameters=parameters,
         )
 
-    def _pose(self) -> Pose:
-        agent = self._agent()
-        return Pose(agent.x_m, agent.y_m, agent.heading_rad)
-
-    def _agent(self) -> Self:
-        agent = self._graph.agent
-        if agent is None:
-            raise MessageError("the graph has no self node")
-        return agent
-
-    def _pick_up(self, post: Percept, pose: Pose) -> None:
-        """Carry a post from now on, and keep in mind where it was, for the map may not have it."""
-        there = pose.after(post.bearing_rad, post.range_m)
-        self._carried.setdefault(post.label, there.position)
-
-    def _choose(self, pose: Pose) -> Choice:
-        """The scheme of the next action, and its parameters."""
+    def _choose(self, pose: Pose, heading_sd_rad: float) -> Choice:
+        """Choose the scheme of the next action, and its parameters."""
         if len(self._carried) < POSTS_CARRIED:
             return FOLLOW, {}
-
         if not self._has_waited:
             self._has_waited = True
             return WAIT, {}
@@ -90,15 +83,12 @@ class Participant:
         label, in_mind = next(iter(self._carried.items()))
         node = self._graph.get(Object, object_id(label))
         goal = in_mind if node is None else (node.x_m, node.y_m)
-        return self._go_back(pose, goal)
-
-    def _go_back(self, pose: Pose, goal: Point) -> Choice:
         bearing_rad, distance_m = pose.towards(goal)
-        may_move = self._movements < MAX_MOVEMENTS
-        is_within_reach = distance_m < REACH_M + NEAR_M
-        is_lost = self._is_lost()
 
-        if not may_move or (is_within_reach and not is_lost):
+        # As long as it does not know where it faces, it looks, so many times.
+        is_lost = self._looks < MAX_LOOKS and heading_sd_rad > LOST_RAD
+        is_within_reach = distance_m < REACH_M + NEAR_M
+        if self._movements >= MAX_MOVEMENTS or (is_within_reach and not is_lost):
             self._has_stopped = True
             return STOP, _movement(bearing_rad, distance_m)
 
@@ -110,19 +100,13 @@ class Participant:
         turn_rad, forward_m = step(bearing_rad, distance_m)
         return WALK, _movement(turn_rad, forward_m)
 
-    def _is_lost(self) -> bool:
-        """Whether it does not know where it faces, and may look once more."""
-        agent = self._agent()
-        may_look = self._looks < MAX_LOOKS
-        return may_look and agent.heading_sd_rad > LOST_RAD
-
 
 def _movement(turn_rad: float, forward_m: float) -> dict[str, Scalar]:
-    """The parameters of a turn on the spot and a step straight on."""
+    """Return the parameters of a turn on the spot and a step straight on."""
     return {"turn_rad": turn_rad, "forward_m": forward_m}
 
 
 def build() -> Module:
-    """The module `participant`."""
+    """Build the module `participant`."""
     participant = Participant()
     return Module("participant").on(topics.DELTA, participant.on_delta, emits=[topics.ACTION])

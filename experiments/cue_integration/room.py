@@ -59,49 +59,44 @@ class Room:
         self.response: Response | None = None
 
     def begin(self) -> list[Message]:
-        """What is seen from the start."""
+        """Return what is seen from the start."""
         percepts = self._seen(NOTHING)
         return self._sensed(senses.STANDING, percepts)
 
     def act(self, action: Action) -> list[Message]:
         """Carry out the participant's action; nothing more is sensed after the last."""
-        if action.scheme == FOLLOW:
-            return self._follow()
         if action.scheme == WAIT:
             return self._change()
 
-        turn_rad = float(action.parameters["turn_rad"])
-        forward_m = float(action.parameters["forward_m"])
-        if action.scheme == WALK:
-            return self._walk(turn_rad, forward_m)
+        picked: Mapping[str, Point] = NOTHING
+        if action.scheme == FOLLOW:
+            # It walks to the post that is lit, and picks it up if it is within reach then.
+            number = self._to_pick[0]
+            post = POSTS[number]
+            turn_rad, forward_m = step(*self._pose.towards(post))
+            _, left_m = self._pose.after(turn_rad, forward_m).towards(post)
+            if left_m <= REACH_M + TOLERANCE_M:
+                self._to_pick.pop(0)
+                picked = {f"post-{number}": post}
+        else:
+            turn_rad = float(action.parameters["turn_rad"])
+            forward_m = float(action.parameters["forward_m"])
 
-        put = self._pose.after(turn_rad, forward_m)
-        self.response = Response(put.x_m, put.y_m, self._frame)
-        return []
+        there = self._pose.after(turn_rad, forward_m)
+        if action.scheme == STOP:
+            self.response = Response(there.x_m, there.y_m, self._frame)
+            return []
+
+        self._pose = there
+        felt = senses.self_motion(turn_rad, forward_m, self._trial.noise, self._rng)
+        motions = felt if self._knows_motion else senses.UNKNOWN
+        return self._sensed(motions, self._seen(picked))
 
     def close(self) -> None:
         """Leave whatever is open for the trial."""
 
-    def _follow(self) -> list[Message]:
-        """The participant walks to the post that is lit, and picks it up where it is within
-        reach.
-        """
-        number = self._to_pick[0]
-        post = POSTS[number]
-        bearing_rad, distance_m = self._pose.towards(post)
-        turn_rad, forward_m = step(bearing_rad, distance_m)
-
-        there = self._pose.after(turn_rad, forward_m)
-        _, left_m = there.towards(post)
-        if left_m > REACH_M + TOLERANCE_M:
-            return self._walk(turn_rad, forward_m)
-
-        self._to_pick.pop(0)
-        picked = {f"post-{number}": post}
-        return self._walk(turn_rad, forward_m, picked)
-
     def _change(self) -> list[Message]:
-        """What happens, eyes closed, before the participant walks back."""
+        """Change the room, eyes closed, before the participant walks back."""
         condition = self._trial.condition
         self._are_lit = condition is not Condition.SELF_MOTION
 
@@ -117,19 +112,8 @@ class Room:
         self._pose = Pose(self._pose.x_m, self._pose.y_m, heading_rad)
         return self._sensed(senses.DISORIENTED, [])
 
-    def _walk(
-        self, turn_rad: float, forward_m: float, picked: Mapping[str, Point] = NOTHING
-    ) -> list[Message]:
-        noise = self._trial.noise
-        self._pose = self._pose.after(turn_rad, forward_m)
-        felt = senses.self_motion(turn_rad, forward_m, noise, self._rng)
-        motions = felt if self._knows_motion else senses.UNKNOWN
-
-        percepts = self._seen(picked)
-        return self._sensed(motions, percepts)
-
     def _seen(self, picked: Mapping[str, Point]) -> list[Percept]:
-        """The landmarks that are lit, and what is being picked up."""
+        """Return the landmarks that are lit, and what is being picked up."""
         things: dict[str, Point] = {}
 
         if self._are_lit:
@@ -140,7 +124,7 @@ class Room:
         return senses.sightings(self._pose, things, self._trial.noise, self._rng)
 
     def _sensed(self, motions: Rows, objects: list[Percept]) -> list[Message]:
-        """The messages of the next frame."""
+        """Return the messages of the next frame."""
         frame = self._frame
         self._frame += 1
         stamp_ns = self._frame * PERIOD_NS
@@ -157,7 +141,7 @@ class Room:
 
 
 def build(room: Room) -> Module:
-    """The module `room`, which begins when all whom it awaits are there."""
+    """Build the module `room`, which begins when all whom it awaits are there."""
     emits = (topics.SELF_MOTION, topics.PERCEPTS)
     module = Module("room")
     module.on(topics.ACTION, room.act, emits=emits)

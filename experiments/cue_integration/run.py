@@ -46,14 +46,14 @@ class Session:
         self.transcript = Transcript(COMPARED)
 
     def bodies(self) -> list[Module]:
-        """All that is not the mind. The room is the last, for it begins."""
+        """Return all that is not the mind. The room is the last, for it begins."""
         listener = self.transcript.module()
         subject = participant.build()
         world = room.build(self.room)
         return [listener, subject, world]
 
     def run(self) -> Response:
-        """Run it on the in-memory bus. Raises CogmapError where no response comes."""
+        """Run it on the in-memory bus. Raises CogmapError if no response comes."""
         mind = agent.modules(self.trial.number)
         runner = InProcessRunner([*mind, *self.bodies()])
         runner.run()
@@ -80,11 +80,13 @@ class Outcome:
     shift_m: float
 
     def sd_m(self, condition: Condition) -> float:
-        """The standard deviation of a condition's responses."""
+        """Return the standard deviation of a condition's responses."""
         return analysis.sd_m(self.errors_m[condition])
 
     def rmse_m(self, condition: Condition) -> float:
-        """The root mean squared distance of a condition's responses from where the post stood."""
+        """Return the root mean squared distance of a condition's responses from where the post
+        stood.
+        """
         return analysis.rmse_m(self.errors_m[condition])
 
     @property
@@ -96,42 +98,45 @@ class Outcome:
 
     @property
     def landmark_weight(self) -> float:
-        """What landmarks would weigh then."""
+        """Return what landmarks would weigh then."""
         self_motion_m = self.sd_m(Condition.SELF_MOTION)
         landmarks_m = self.sd_m(Condition.LANDMARKS)
         return analysis.landmark_weight(self_motion_m, landmarks_m)
 
     def metrics(self) -> Metrics:
-        """Every metric, flat; lengths in metres."""
+        """Return every metric, flat, beside those published; lengths in metres."""
         metrics: Metrics = {}
-        for condition in self.errors_m:
-            metrics |= self._of(condition)
+        for condition, errors_m in self.errors_m.items():
+            name = condition.value
+            metrics |= {
+                f"sd_{name}_m": self.sd_m(condition),
+                f"rmse_{name}_m": self.rmse_m(condition),
+                f"lost_trials_{name}": float(analysis.lost(errors_m)),
+                f"published_simulation_sd_{name}_m": published.SD_M[condition],
+                f"published_simulation_rmse_{name}_m": published.RMSE_M[condition],
+            }
 
         metrics["sd_optimal_m"] = self.optimal_sd_m
         metrics["sd_both_over_optimal"] = metrics["sd_both_m"] / self.optimal_sd_m
-        return metrics | self._conflict() | self._protocol()
-
-    def _of(self, condition: Condition) -> Metrics:
-        """The metrics of one condition, beside those published."""
-        name = condition.value
-        lost = analysis.lost(self.errors_m[condition])
-        return {
-            f"sd_{name}_m": self.sd_m(condition),
-            f"rmse_{name}_m": self.rmse_m(condition),
-            f"lost_trials_{name}": float(lost),
-            f"published_simulation_sd_{name}_m": published.SD_M[condition],
-            f"published_simulation_rmse_{name}_m": published.RMSE_M[condition],
+        metrics |= self.conflict_metrics()
+        return metrics | {
+            "sigma_v": self.noise.speed,
+            "sigma_w": self.noise.turn,
+            "distance_noise": self.noise.distance,
+            "trials_a_condition": float(len(self.errors_m[Condition.BOTH])),
         }
 
-    def _conflict(self) -> Metrics:
-        """How likely the conflict's responses are where cues are integrated, and where they
+    def conflict_metrics(self) -> Metrics:
+        """Return how likely the conflict's responses are if cues are integrated, and if they
         alternate.
 
         Both predictions follow from the conditions with one cue, with nothing left to fit; the best
         alternation has the share of landmarks that suits it most.
         """
         conflict_m = self.errors_m[Condition.CONFLICT]
-        own, seen = self._single_cues()
+        own = Gaussian.of(self.errors_m[Condition.SELF_MOTION])
+        landmarks_m = self.errors_m[Condition.LANDMARKS]
+        seen = Gaussian.of(analysis.turned_errors(landmarks_m, self.shift_m))
 
         integrated = analysis.combined(own, seen).log_density(conflict_m)
         alternated = analysis.alternation_log_densities(conflict_m, own, seen, self.landmark_weight)
@@ -150,25 +155,6 @@ class Outcome:
             "integration_over_alternation_median_of_a_trial": float(np.median(differences)),
             "integration_likelier_share": float(is_likelier.mean()),
             "integration_over_best_alternation": total - best,
-        }
-
-    def _single_cues(self) -> tuple[Gaussian, Gaussian]:
-        """The conflict's responses by self-motion alone, and by the turned landmarks alone."""
-        self_motion_m = self.errors_m[Condition.SELF_MOTION]
-        self_motion = Gaussian.of(self_motion_m)
-
-        landmarks_m = self.errors_m[Condition.LANDMARKS]
-        turned_m = analysis.turned_errors(landmarks_m, self.shift_m)
-        landmarks = Gaussian.of(turned_m)
-        return self_motion, landmarks
-
-    def _protocol(self) -> Metrics:
-        trials = len(self.errors_m[Condition.BOTH])
-        return {
-            "sigma_v": self.noise.speed,
-            "sigma_w": self.noise.turn,
-            "distance_noise": self.noise.distance,
-            "trials_a_condition": float(trials),
         }
 
 

@@ -23,7 +23,7 @@ UNKNOWN: Rows = [
 
 
 def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.Generator) -> Rows:
-    """A turn on the spot, then a distance straight on, as rows of SelfMotion: multiplied by
+    """Return a turn on the spot, then a distance straight on, as rows of SelfMotion: multiplied by
     Gaussians of mean one (§5.4).
 
     Their standard deviations follow from what is felt, all that a participant knows of them.
@@ -42,8 +42,8 @@ def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.
 
 
 def _sd_of_true(felt: float, noise: float) -> float:
-    """The standard deviation of the true value where that times a Gaussian of mean one was felt, to
-    the fourth order.
+    """Return the standard deviation of the true value where that times a Gaussian of mean one was
+    felt, to the fourth order.
 
     It is more than that of the factor: who has felt little may have felt a fraction of much.
     """
@@ -54,7 +54,7 @@ def _sd_of_true(felt: float, noise: float) -> float:
 def sightings(
     pose: Pose, things: Mapping[str, Point], noise: Noise, rng: np.random.Generator
 ) -> list[Percept]:
-    """All things, by label, wherever the participant faces: it looks around."""
+    """Return percepts of all things, by label, wherever the participant faces: it looks around."""
     sd = noise.distance
     seen = []
 
@@ -62,25 +62,20 @@ def sightings(
         true_bearing_rad, distance_m = pose.towards(position)
         range_m = distance_m * float(rng.normal(1.0, sd))
         bearing_rad = true_bearing_rad + float(rng.normal(0.0, sd))
-        seen.append(_percept(label, bearing_rad, range_m, sd, sd * range_m))
+        seen.append(
+            Percept(
+                label=label,
+                activation=1.0,
+                evidence=1.0,
+                bearing_rad=bearing_rad,
+                range_m=range_m,
+                bearing_sd_rad=sd,
+                range_sd_m=sd * range_m,
+                width_m=0.1,
+                height_m=0.1,
+                whole=True,
+                box_px=(0, 0, 1, 1),
+            )
+        )
 
     return seen
-
-
-def _percept(
-    label: str, bearing_rad: float, range_m: float, bearing_sd_rad: float, range_sd_m: float
-) -> Percept:
-    """A small glowing thing."""
-    return Percept(
-        label=label,
-        activation=1.0,
-        evidence=1.0,
-        bearing_rad=bearing_rad,
-        range_m=range_m,
-        bearing_sd_rad=bearing_sd_rad,
-        range_sd_m=range_sd_m,
-        width_m=0.1,
-        height_m=0.1,
-        whole=True,
-        box_px=(0, 0, 1, 1),
-    )

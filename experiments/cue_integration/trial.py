@@ -54,19 +54,19 @@ class Trial:
         return 1 if is_even else -1
 
     def generator(self) -> np.random.Generator:
-        """The world's own noise in this trial."""
+        """Return the world's own noise in this trial."""
         condition = list(Condition).index(self.condition)
         return np.random.default_rng([self.seed, condition, self.number])
 
     @property
     def target(self) -> Point:
-        """Where the first post stood."""
+        """Return where the first post stood."""
         first, _, _ = self.route
         return POSTS[first]
 
     @property
     def turned_target(self) -> Point:
-        """Where it stood by landmarks turned as in a conflict."""
+        """Return where it stood by landmarks turned as in a conflict."""
         (position,) = turned((self.target,), self.side * CONFLICT_RAD)
         return position
 

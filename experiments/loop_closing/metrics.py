@@ -19,56 +19,32 @@ Metrics = dict[str, float]
 
 
 def loop_metrics(loops: Mapping[str, Loop]) -> Metrics:
-    """Errors before and after the first correction and in the end, by the method of correction.
+    """Return errors before and after the first correction and in the end, by the method of
+    correction.
 
     `positions` is the paper's own rule (eq. 9), `heading` ours. `path_error_wheels_alone_m` and
     `path_error_fused_alone_m` are of the path by path integration alone: of the wheels, and of
-    self-motion as the agent has it; they are the same where no images are taken.
+    self-motion as the agent has it; they are the same if no images are taken.
     """
     metrics: Metrics = {}
-
     for method, loop in loops.items():
-        metrics |= _of_loop(loop, method)
+        maps = {"before": loop.before, "after": loop.after, "in_the_end": loop.end}
+        for error in ERRORS:
+            for when, learned in maps.items():
+                metrics[f"{error}_{when}_m_{method}"] = getattr(learned, f"{error}_m")
+        metrics[f"corrections_{method}"] = float(len(loop.replays))
+        metrics[f"replays_of_the_first_{method}"] = float(loop.replays[0].passes)
 
-    positions = loops["positions"]
-    metrics |= _alone(positions)
-    return metrics | _predicted(positions.replays[0])
-
-
-def _of_loop(loop: Loop, method: str) -> Metrics:
-    """Errors and corrections of one loop, by its method."""
-    metrics: Metrics = {}
-    maps = {"before": loop.before, "after": loop.after, "in_the_end": loop.end}
-
-    for error in ERRORS:
-        for when, learned in maps.items():
-            error_m = getattr(learned, f"{error}_m")
-            metrics[f"{error}_{when}_m_{method}"] = error_m
-
-    first = loop.replays[0]
-    metrics[f"corrections_{method}"] = float(len(loop.replays))
-    metrics[f"replays_of_the_first_{method}"] = float(first.passes)
-    return metrics
-
-
-def _alone(loop: Loop) -> Metrics:
-    """The errors of the path by path integration alone."""
+    loop = loops["positions"]
     true_path_m = loop.end.true_path_m
-    return {
-        "path_error_wheels_alone_m": rms_m(loop.wheels_path_m - true_path_m),
-        "path_error_fused_alone_m": rms_m(loop.fused_path_m - true_path_m),
-    }
+    metrics["path_error_wheels_alone_m"] = rms_m(loop.wheels_path_m - true_path_m)
+    metrics["path_error_fused_alone_m"] = rms_m(loop.fused_path_m - true_path_m)
 
-
-def _predicted(replay: Replayed) -> Metrics:
-    """How the change of synapses depends on how much nearer place fields come.
-
-    It is k a metre, where they are close.
-    """
-    every = np.ones_like(replay.close)
-    close_pairs = _fit("close_pairs", replay, replay.close)
-    all_pairs = _fit("all_pairs", replay, every)
-    return {"synapse_decay_per_m": replay.decay_per_m} | close_pairs | all_pairs
+    # The change of synapses for a metre that place fields come nearer is k, if they are close.
+    replay = loop.replays[0]
+    metrics["synapse_decay_per_m"] = replay.decay_per_m
+    metrics |= _fit("close_pairs", replay, replay.close)
+    return metrics | _fit("all_pairs", replay, np.ones_like(replay.close))
 
 
 def _fit(name: str, replay: Replayed, pairs: npt.NDArray[np.bool_]) -> Metrics:
@@ -89,7 +65,9 @@ def _fit(name: str, replay: Replayed, pairs: npt.NDArray[np.bool_]) -> Metrics:
 
 
 def rule_metrics(seed: int) -> Metrics:
-    """What eq. 9 does for many laps of the wheels alone, with the headings' noise and without."""
+    """Return what eq. 9 does for many laps of the wheels alone, with the headings' noise and
+    without.
+    """
     exact_headings = Noise(speed=NOISE.speed, turn=0.0, drift_rad_per_sqrt_m=0.0)
     metrics: Metrics = {}
 

@@ -116,17 +116,17 @@ class Observer:
         self._after: Map | None = None
 
     def module(self) -> Module:
-        """The module `observer`."""
+        """Build the module `observer`."""
         return (
             Module("observer")
-            .on(topics.DELTA, self._on_delta)
-            .on(topics.TRUE_POSE, self._on_pose)
+            .on(topics.DELTA, self.on_delta)
+            .on(topics.TRUE_POSE, self.on_pose)
             .on(topics.ODOMETRY, self._wheels.on_odometry)
-            .on(topics.REPLAY, self._on_replay)
+            .on(topics.REPLAY, self.on_replay)
         )
 
     def loop(self) -> Loop:
-        """What was observed. Raises CogmapError where no loop was closed."""
+        """Return what was observed. Raises CogmapError if no loop was closed."""
         if self._before is None or self._after is None:
             raise CogmapError("no loop was closed on the path")
 
@@ -145,7 +145,10 @@ class Observer:
             replays=self._replays,
         )
 
-    def _on_delta(self, delta: Delta) -> None:
+    def on_delta(self, delta: Delta) -> None:
+        """Follow the graph, and keep the map around its first correction. Raises CogmapError if a
+        delta is missing.
+        """
         corrects = delta.phase is Phase.CORRECTION and self._before is None
         if corrects:
             self._before = self._map()
@@ -156,18 +159,22 @@ class Observer:
         if corrects:
             self._after = self._map()
 
-    def _on_pose(self, true: TruePose) -> None:
+    def on_pose(self, true: TruePose) -> None:
+        """Keep the true position by its stamp."""
         pose = true.pose
         self._true[true.stamp_ns] = (pose.x_m, pose.y_m)
 
-    def _on_replay(self, replay: Replay) -> None:
-        replayed = Replayed.of(replay)
-        self._replays.append(replayed)
+    def on_replay(self, replay: Replay) -> None:
+        """Keep a reverse replay."""
+        self._replays.append(Replayed.of(replay))
 
     def _map(self) -> Map:
-        """The map as it is now."""
+        """Return the map as it is now, with the true position at the stamp nearest to each."""
         rows = reading.path_rows(self._graph)
-        stamps_s = rows[:, reading.STAMP]
+        stamps_ns = np.rint(rows[:, reading.STAMP] * 1e9).astype(np.int64)
+        known_ns = np.array(list(self._true))
+        nearest = np.abs(known_ns - stamps_ns[:, None]).argmin(axis=1)
+        known_m = np.array(list(self._true.values()), np.float64)
         path_m = rows[:, reading.POSE][:, :2]
 
         labels = sorted(self._landmarks)
@@ -177,23 +184,11 @@ class Observer:
 
         return Map(
             path_m=path_m,
-            true_path_m=self._true_path_m(stamps_s),
+            true_path_m=known_m[nearest].reshape(-1, 2),
             objects_m=objects_m[is_known],
             true_objects_m=true_objects_m[is_known],
             road_m=reading.road_m(self._graph),
         )
-
-    def _true_path_m(self, stamps_s: Floats) -> Floats:
-        """(n, 2): where the agent truly was at the stamp known nearest to each."""
-        known_ns = np.array(list(self._true))
-        known_m = np.array(list(self._true.values()))
-
-        stamps_ns = np.rint(stamps_s * 1e9).astype(np.int64)
-        apart_ns = np.abs(known_ns - stamps_ns[:, None])
-        nearest = apart_ns.argmin(axis=1)
-
-        positions_m = known_m[nearest].reshape(-1, 2)
-        return np.asarray(positions_m, np.float64)
 
 
 def rms_m(offsets_m: Floats) -> float:

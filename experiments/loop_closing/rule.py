@@ -44,11 +44,17 @@ class Laps:
 def close_laps(
     corners_m: Sequence[tuple[float, float]], step_m: float, noise: Noise, laps: int, seed: int
 ) -> Laps:
-    """`laps` times once round `corners_m`, which end where they begin, in steps of `step_m`, with
-    `noise` each.
+    """Measure `laps` times once round `corners_m`, which end where they begin, in steps of
+    `step_m`, with `noise` each.
     """
-    distance_m, turn_rad, begins_rad = _legs(corners_m, step_m)
-    heading_rad = begins_rad + _sum_before(turn_rad)
+    line = Line(np.array(corners_m, float))
+    stops_m = np.arange(0.0, line.length_m, step_m).tolist()
+    legs = []
+    for start_m, end_m in itertools.pairwise([*stops_m, line.length_m]):
+        legs += line.legs(start_m, end_m)
+    # Of each leg: straight on, and then a turn on the spot.
+    distance_m, turn_rad = np.array(legs).T
+    heading_rad = float(line.heading_rad[0]) + _sum_before(turn_rad)
     true_m = _displacements_m(distance_m, heading_rad)
 
     rng = np.random.default_rng(seed)
@@ -56,30 +62,18 @@ def close_laps(
     measured_heading_rad = heading_rad + heading_error_rad
     measured_m = _displacements_m(measured_distance_m, measured_heading_rad)
 
+    # Eq. 9: the error of the end is taken from each position by the share of the loop before it.
     error_m = np.cumsum(measured_m - true_m, axis=1)
-    closed_m = _closed_m(error_m, distance_m)
+    along_m = np.cumsum(distance_m)
+    share = along_m / along_m[-1]
+    closed_m = error_m - share[:, None] * error_m[:, -1:]
     return Laps(_rms_m(error_m), _rms_m(closed_m))
-
-
-def _legs(corners_m: Sequence[tuple[float, float]], step_m: float) -> tuple[Floats, Floats, float]:
-    """Distance and turn (n,) of each leg, first straight on and then on the spot; first heading."""
-    line = Line(np.array(corners_m, float))
-    stops_m = np.arange(0.0, line.length_m, step_m).tolist()
-    stops_m.append(line.length_m)
-    legs = []
-
-    for start_m, end_m in itertools.pairwise(stops_m):
-        legs += line.legs(start_m, end_m)
-
-    distance_m, turn_rad = np.array(legs).T
-    begins_rad = float(line.heading_rad[0])
-    return distance_m, turn_rad, begins_rad
 
 
 def _measured(
     distance_m: Floats, turn_rad: Floats, noise: Noise, laps: int, rng: np.random.Generator
 ) -> tuple[Floats, Floats]:
-    """Distances and errors of headings, (laps, n) each, as the wheels measure the n legs."""
+    """Return distances and errors of headings, (laps, n) each, as the wheels measure the n legs."""
     legs = len(distance_m)
     speed, drift, turn = rng.normal(0.0, 1.0, (3, laps, legs))
     measured_m = distance_m * (1 + noise.speed * speed)
@@ -101,18 +95,8 @@ def _displacements_m(distance_m: Floats, heading_rad: Floats) -> Floats:
     return np.stack([x_m, y_m], axis=-1)
 
 
-def _closed_m(error_m: Floats, distance_m: Floats) -> Floats:
-    """Errors (laps, n, 2) after eq. 9: that of the end is taken from each position by the share of
-    the loop that lies before it.
-    """
-    along_m = np.cumsum(distance_m)
-    share = along_m / along_m[-1]
-    end_m = error_m[:, -1:]
-    return np.asarray(error_m - share[:, None] * end_m)
-
-
 def _sum_before(values: Floats) -> Floats:
-    """The sum of all values before each, along the last axis."""
+    """Return the sum of all values before each, along the last axis."""
     sums: Floats = np.cumsum(values, axis=-1) - values
     return sums
 

@@ -45,21 +45,10 @@ NOISE = Noise(speed=Noise().speed / READINGS**0.5, turn=Noise().turn / READINGS*
 
 
 def trajectory() -> dict[str, Any]:
-    """A line round some blocks and a bit of it again, and landmarks along it."""
-    line_m = [*CORNERS_M, AGAIN_M]
-    landmarks = []
-
-    for number, (x_m, y_m) in enumerate(_landmarks_m()):
-        landmark = {"name": f"building-{number:02d}", "x_m": x_m, "y_m": y_m}
-        landmarks.append(landmark)
-
-    return {"line_m": line_m, "landmarks": landmarks, "speed_m_s": SPEED_M_S}
-
-
-def _landmarks_m() -> list[list[float]]:
-    """(k, 2): along the blocks, left and right in turn."""
-    found: list[list[float]] = []
-
+    """Return a line round some blocks and a bit of it again, and landmarks along the blocks, left
+    and right in turn.
+    """
+    landmarks: list[dict[str, Any]] = []
     for start_m, end_m in itertools.pairwise(np.array(CORNERS_M)):
         street_m = end_m - start_m
         length_m = float(np.hypot(*street_m))
@@ -67,16 +56,19 @@ def _landmarks_m() -> list[list[float]]:
         right = np.array([ahead[1], -ahead[0]])
 
         for along_m in np.arange(APART_M / 2, length_m, APART_M):
-            is_right = len(found) % 2
-            right_m = ASIDE_M if is_right else -ASIDE_M
-            position_m = start_m + along_m * ahead + right_m * right
-            found.append(position_m.tolist())
+            number = len(landmarks)
+            right_m = ASIDE_M if number % 2 else -ASIDE_M
+            x_m, y_m = (start_m + along_m * ahead + right_m * right).tolist()
+            landmarks.append({"name": f"building-{number:02d}", "x_m": x_m, "y_m": y_m})
 
-    return found
+    line_m = [*CORNERS_M, AGAIN_M]
+    return {"line_m": line_m, "landmarks": landmarks, "speed_m_s": SPEED_M_S}
 
 
 def sections(seed: int, method: str) -> Sections:
-    """The configuration of every module, as for `cogmap run --config`, for one of METHODS."""
+    """Return the configuration of every module, as for `cogmap run --config`, for one of
+    METHODS.
+    """
     step_m = SPEED_M_S / FRAME_HZ
     sim = {
         "seed": seed,
@@ -105,7 +97,7 @@ def sections(seed: int, method: str) -> Sections:
 
 
 def drive(seed: int, method: str) -> Loop:
-    """Drive the loop once. Raises CogmapError where no loop is closed, or a message is refused."""
+    """Drive the loop once. Raises CogmapError if no loop is closed, or a message is refused."""
     configured = sections(seed, method)
     modules = [registry.build(name, configured) for name in MODULES]
     return driven(configured, modules)

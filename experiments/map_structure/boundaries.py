@@ -56,8 +56,8 @@ def _lengths_m(lines_m: Floats) -> Floats:
 
 
 def _pieces(segments_m: Floats) -> Floats:
-    """The same segments, in pieces of at most twice their median length; in fewer where those would
-    be too many.
+    """Return the same segments, in pieces of at most twice their median length; in fewer where
+    those would be too many.
     """
     if not len(segments_m):
         return segments_m

@@ -47,8 +47,8 @@ class StructuredCity:
 
 
 def read_city(path: Path) -> StructuredCity:
-    """The city of an OpenStreetMap extract. Raises UsageError where it cannot be read, or has too
-    few buildings.
+    """Return the city of an OpenStreetMap extract. Raises UsageError if it cannot be read, or has
+    too few buildings.
     """
     extract = osm.read(path)
     streets = streets_of(extract, path)
@@ -64,6 +64,11 @@ def read_city(path: Path) -> StructuredCity:
             "give a larger extract"
         )
 
+    named = [
+        node
+        for node, tags in extract.node_tags.items()
+        if tags.get("place") in PLACES and "name" in tags
+    ]
     return StructuredCity(
         name=name_of(path),
         streets=streets,
@@ -71,12 +76,14 @@ def read_city(path: Path) -> StructuredCity:
         functions=np.concatenate([functions, spot_functions[is_alone]]),
         half_widths_m=np.concatenate([half_widths_m, np.zeros(is_alone.sum())]),
         boundaries_m=_boundaries(extract, middle),
-        places_m=_places(extract, middle),
+        places_m=_line_m(extract, named, middle),
     )
 
 
 def _buildings(extract: Extract, middle: Floats) -> tuple[Floats, Floats, Indices]:
-    """The centres of buildings, (n, 2), half their widths, (n,), and their functions, (n,)."""
+    """Return the centres of buildings, (n, 2), half their widths, (n,), and their functions,
+    (n,).
+    """
     centres_m = []
     half_widths_m = []
     functions = []
@@ -99,16 +106,9 @@ def _buildings(extract: Extract, middle: Floats) -> tuple[Floats, Floats, Indice
 
 
 def _spots(extract: Extract, middle: Floats) -> tuple[Floats, Indices]:
-    """Places that are points, and whose function is known, (k, 2), and these, (k,)."""
-    lonlat = []
-    functions = []
-    for node, tags in extract.node_tags.items():
-        if function_of(tags):
-            lonlat.append(extract.nodes[node])
-            functions.append(_code(tags))
-
-    spots_m = plane_m(np.array(lonlat), middle) if lonlat else np.zeros((0, 2))
-    return spots_m, np.array(functions, np.int64)
+    """Return places that are points, and whose function is known, (k, 2), and these, (k,)."""
+    functions = {node: _code(tags) for node, tags in extract.node_tags.items() if function_of(tags)}
+    return _line_m(extract, functions, middle), np.array(list(functions.values()), np.int64)
 
 
 def _give_functions(
@@ -151,16 +151,6 @@ def _separates(tags: Tags) -> bool:
     is_water = "waterway" in tags or tags.get("natural") in ("water", "coastline")
     is_barrier = tags.get("barrier") in BARRIERS
     return is_road or is_rail or is_water or is_barrier
-
-
-def _places(extract: Extract, middle: Floats) -> Floats:
-    """(k, 2): the named quarters and villages."""
-    lonlat = []
-    for node, tags in extract.node_tags.items():
-        if tags.get("place") in PLACES and "name" in tags:
-            lonlat.append(extract.nodes[node])
-
-    return plane_m(np.array(lonlat), middle) if lonlat else np.zeros((0, 2))
 
 
 def _line_m(extract: Extract, nodes: Iterable[int], middle: Floats) -> Floats:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from cogmap.data.osm import Tags
 
 HOME = "home"
@@ -45,9 +43,9 @@ _OF_KEY = {
 
 
 def function_of(tags: Tags) -> str:
-    """One of FUNCTIONS; empty where the tags imply none."""
+    """One of FUNCTIONS; empty if the tags imply none."""
     for key, table in (("amenity", _OF_AMENITY), ("building", _OF_BUILDING)):
-        function = _looked_up(tags, key, table)
+        function = table.get(tags.get(key, ""), "")
         if function:
             return function
 
@@ -56,7 +54,3 @@ def function_of(tags: Tags) -> str:
             return function
 
     return ""
-
-
-def _looked_up(tags: Tags, key: str, table: Mapping[str, str]) -> str:
-    return table.get(tags.get(key, ""), "")

@@ -36,7 +36,7 @@ class Structured:
 
     @property
     def count(self) -> int:
-        """How many sub-maps there are."""
+        """Return how many sub-maps there are."""
         return len(np.unique(self.labels))
 
 
@@ -51,13 +51,15 @@ class Job:
 def measure(
     cities: Sequence[StructuredCity], seed: int, processes: int, progress: Progress
 ) -> list[Structured]:
-    """The sub-maps of each city."""
+    """Return the sub-maps of each city."""
     jobs = [Job(city, seed) for city in cities]
     return parallel_map(structured, jobs, processes, progress)
 
 
 def structured(job: Job) -> Structured:
-    """The sub-maps of one city, by all features and the weights that the system runs with."""
+    """Return the sub-maps of one city, by all features and the weights that the system runs
+    with.
+    """
     city = job.city
     rng = np.random.default_rng([job.seed, 0x5B])
     repeats = []
@@ -70,7 +72,7 @@ def structured(job: Job) -> Structured:
 
 
 def metrics_of(found: Sequence[Structured]) -> dict[str, float | str]:
-    """What is reported of each city, by keys that begin with its name."""
+    """Return what is reported of each city, by keys that begin with its name."""
     metrics: dict[str, float | str] = {}
     for each in found:
         for key, value in _metrics(each).items():
@@ -80,8 +82,8 @@ def metrics_of(found: Sequence[Structured]) -> dict[str, float | str]:
 
 
 def adjusted_rand_index(first: Indices, second: Indices) -> float:
-    """The adjusted Rand index of two partitions (n,) (Hubert and Arabie 1985): 1 where they are the
-    same, about 0 where they agree by chance alone.
+    """Return the adjusted Rand index of two partitions (n,) (Hubert and Arabie 1985): 1 where they
+    are the same, about 0 where they agree by chance alone.
     """
     _, row = np.unique(first, return_inverse=True)
     _, column = np.unique(second, return_inverse=True)
@@ -120,7 +122,10 @@ def _labels(city: StructuredCity) -> Indices:
 def _metrics(found: Structured) -> dict[str, float]:
     city = found.city
     sizes = np.unique(found.labels, return_counts=True)[1]
-    areas_ha = [_area_ha(city.positions_m[found.labels == label]) for label in range(found.count)]
+    areas_ha = []
+    for label in range(found.count):
+        width_m, height_m = np.ptp(city.positions_m[found.labels == label], axis=0).tolist()
+        areas_ha.append(width_m * height_m / 1e4)
     stable = [adjusted_rand_index(found.labels, repeat) for repeat in found.repeats]
 
     metrics = {
@@ -143,7 +148,7 @@ def _metrics(found: Structured) -> dict[str, float]:
 
 
 def _separation(found: Structured) -> dict[str, float]:
-    """How often a boundary is between neighbours of one sub-map, and of two."""
+    """Return how often a boundary is between neighbours of one sub-map, and of two."""
     city = found.city
     edges = neighbours(city.positions_m)
     clear_m = (city.half_widths_m + CLEARANCE_M)[edges]
@@ -157,15 +162,9 @@ def _separation(found: Structured) -> dict[str, float]:
     return separation
 
 
-def _area_ha(positions_m: Floats) -> float:
-    """The area of the rectangle around (n, 2) positions, in hectares."""
-    width_m, height_m = np.ptp(positions_m, axis=0).tolist()
-    return float(width_m * height_m) / 1e4
-
-
 def _silhouette(positions_m: Floats, labels: Indices) -> float:
-    """The mean silhouette by distance (Rousseeuw 1987), of at most MAX_COMPARED objects, evenly
-    chosen; 0 where there is one sub-map.
+    """Return the mean silhouette by distance (Rousseeuw 1987), of at most MAX_COMPARED objects,
+    evenly chosen; 0 if there is one sub-map.
     """
     step = -(-len(labels) // MAX_COMPARED)
     positions_m = positions_m[::step]

@@ -10,7 +10,7 @@ import numpy as np
 
 from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Booleans, Floats, Indices
-from cogmap.services.codelets.planning.activation import climb, spread
+from cogmap.services.codelets.planning.activation import spread
 from cogmap.services.codelets.planning.network import grid_network
 
 SIDE = 27
@@ -36,7 +36,7 @@ def free_ground() -> Spread:
 
 
 def walled_ground() -> Spread:
-    """The links across WALLS have the weight 0."""
+    """Return the links across WALLS have the weight 0."""
     is_free = np.ones((SIDE, SIDE), bool)
     for (first_i, first_j), (last_i, last_j) in WALLS:
         is_free[first_i : last_i + 1, first_j : last_j + 1] = False
@@ -47,7 +47,7 @@ def walled_ground() -> Spread:
 def _spread(is_free: Booleans) -> Spread:
     network = grid_network(is_free)
     field = spread(network, np.array([GOAL]))
-    route = climb(network, field, START)
+    route = field.climb(START)
     if route is None:
         raise CogmapError("no route leads from the start to the goal of figure 5")
 

@@ -63,7 +63,7 @@ class Planned:
 
     @property
     def goals(self) -> int:
-        """How many."""
+        """Return how many."""
         return len(self.positions)
 
     @property
@@ -75,14 +75,14 @@ class Planned:
 
     @property
     def is_within_quartiles(self) -> bool:
-        """Whether the median of the model lies within those of people."""
+        """Return if the median of the model lies within those of people."""
         low, high = self.people_quartiles
         median = float(np.median(self.hierarchical))
         return low <= median <= high
 
 
 def human_jobs(problems: Sequence[HumanTours], participants: int, seed: int) -> list[Job]:
-    """The problems that people drew tours of."""
+    """Return the problems that people drew tours of."""
     return [
         Job(problem.name, problem.positions, tours, participants, seed)
         for problem, tours in problems
@@ -90,7 +90,7 @@ def human_jobs(problems: Sequence[HumanTours], participants: int, seed: int) -> 
 
 
 def drawn_jobs(sizes: Sequence[int], number: int, seed: int) -> list[Job]:
-    """`number` problems of each size, their goals drawn uniformly from a square."""
+    """Return `number` problems of each size, their goals drawn uniformly from a square."""
     jobs = []
 
     for size in sizes:
@@ -103,7 +103,7 @@ def drawn_jobs(sizes: Sequence[int], number: int, seed: int) -> list[Job]:
 
 
 def measure(jobs: Sequence[Job], processes: int, progress: Progress) -> list[Planned]:
-    """Every problem, in the order given, whatever the number of processes."""
+    """Return every problem, in the order given, whatever the number of processes."""
     return parallel_map(planned, jobs, processes, progress)
 
 

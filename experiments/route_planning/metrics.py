@@ -17,7 +17,8 @@ Metrics = dict[str, float]
 
 
 def human_metrics(problems: Sequence[Planned]) -> Metrics:
-    """Of the problems that people drew tours of: each, and how far the model agrees with people.
+    """Return metrics of the problems that people drew tours of: each, and how far the model agrees
+    with people.
 
     `within_iqr_share` is the share of problems on which the median of the model's participants lies
     within people's quartiles. Correlations are over the problems, of mean with mean.
@@ -39,12 +40,23 @@ def human_metrics(problems: Sequence[Planned]) -> Metrics:
         metrics[f"{name}_correlation_with_people"] = correlation(means, people)
 
     for problem in problems:
-        metrics |= _of_problem(problem)
+        prefix = problem.name.lower()
+        low, high = problem.people_quartiles
+        metrics |= {
+            f"{prefix}_goals": float(problem.goals),
+            f"{prefix}_people": float(len(problem.people)),
+            f"{prefix}_people_above_optimum_median": float(np.median(problem.people)),
+            f"{prefix}_people_above_optimum_quartile_1": low,
+            f"{prefix}_people_above_optimum_quartile_3": high,
+            f"{prefix}_hierarchical_above_optimum_median": float(np.median(problem.hierarchical)),
+            f"{prefix}_straightened_above_optimum_median": float(np.median(problem.straightened)),
+            f"{prefix}_flat_above_optimum_median": float(np.median(problem.flat)),
+        }
     return metrics
 
 
 def drawn_metrics(problems: Sequence[Planned]) -> Metrics:
-    """Means over the drawn problems of each size, beside what is published of people.
+    """Return means over the drawn problems of each size, beside what is published of people.
 
     Published problems are others, of the same numbers of goals.
     """
@@ -57,40 +69,17 @@ def drawn_metrics(problems: Sequence[Planned]) -> Metrics:
             means = _means([getattr(problem, name) for problem in same])
             metrics[f"{prefix}_{name}_above_optimum"] = float(means.mean())
 
-        metrics |= _published(prefix, goals)
+        if goals in published.HUMAN_PERCENT:
+            metrics[f"{prefix}_published_people"] = published.HUMAN_PERCENT[goals] / 100
+            metrics[f"{prefix}_published_model"] = published.MODEL_PERCENT[goals] / 100
+        if goals in published.DRAWN_HUMAN:
+            metrics[f"{prefix}_published_people"] = published.DRAWN_HUMAN[goals]
 
     return metrics
-
-
-def _published(prefix: str, goals: int) -> Metrics:
-    metrics: Metrics = {}
-
-    if goals in published.HUMAN_PERCENT:
-        metrics[f"{prefix}_published_people"] = published.HUMAN_PERCENT[goals] / 100
-        metrics[f"{prefix}_published_model"] = published.MODEL_PERCENT[goals] / 100
-    if goals in published.DRAWN_HUMAN:
-        metrics[f"{prefix}_published_people"] = published.DRAWN_HUMAN[goals]
-
-    return metrics
-
-
-def _of_problem(problem: Planned) -> Metrics:
-    prefix = problem.name.lower()
-    low, high = problem.people_quartiles
-    return {
-        f"{prefix}_goals": float(problem.goals),
-        f"{prefix}_people": float(len(problem.people)),
-        f"{prefix}_people_above_optimum_median": float(np.median(problem.people)),
-        f"{prefix}_people_above_optimum_quartile_1": low,
-        f"{prefix}_people_above_optimum_quartile_3": high,
-        f"{prefix}_hierarchical_above_optimum_median": float(np.median(problem.hierarchical)),
-        f"{prefix}_straightened_above_optimum_median": float(np.median(problem.straightened)),
-        f"{prefix}_flat_above_optimum_median": float(np.median(problem.flat)),
-    }
 
 
 def correlation(first: Floats, second: Floats) -> float:
-    """Pearson's, 0 where there are too few, or one does not vary."""
+    """Return Pearson's correlation, 0 if there are too few, or one does not vary."""
     is_constant = np.ptp(first) == 0 or np.ptp(second) == 0
     if len(first) < MIN_PROBLEMS or is_constant:
         return 0.0
@@ -100,6 +89,6 @@ def correlation(first: Floats, second: Floats) -> float:
 
 
 def _means(values: Sequence[Floats]) -> Floats:
-    """(n,): the mean of each."""
+    """Return the mean of each, (n,)."""
     means = [each.mean() for each in values]
     return np.array(means)

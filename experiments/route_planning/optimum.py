@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.optimize import Bounds, LinearConstraint, OptimizeResult, linprog, milp
+from scipy.optimize import Bounds, LinearConstraint, linprog, milp
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, maximum_flow
 
@@ -59,7 +59,7 @@ class _Programme:
         return csr_array(rows)
 
     def reduced(self, is_kept: Booleans) -> _Programme:
-        """The same with fewer edges; a set that is added to one is added to both."""
+        """Return the same with fewer edges; a set that is added to one is added to both."""
         edges = self.edges[is_kept]
         lengths = self.lengths[is_kept]
         return _Programme(self.count, edges, lengths, self.sets)
@@ -76,9 +76,10 @@ class _Programme:
 
 
 def shortest_tour(lengths: Floats) -> Indices:
-    """The order (n,) of the shortest closed tour by (n, n) symmetric lengths, beginning with 0.
+    """Find the order (n,) of the shortest closed tour by (n, n) symmetric lengths, beginning with
+    0.
 
-    A hundred goals take seconds, or half a minute. Raises CogmapError where the solver fails.
+    A hundred goals take seconds, or half a minute. Raises CogmapError if the solver fails.
     """
     count = len(lengths)
     if count < 4:
@@ -86,10 +87,7 @@ def shortest_tour(lengths: Floats) -> Indices:
 
     first, second = np.triu_indices(count, 1)
     edges = np.column_stack([first, second])
-    return _shortest(_Programme(count, edges, lengths[first, second]))
-
-
-def _shortest(programme: _Programme) -> Indices:
+    programme = _Programme(count, edges, lengths[first, second])
     bound, reduced_costs = _relaxation(programme)
     slack = _FIRST_SLACK * bound
 
@@ -109,21 +107,21 @@ def _shortest(programme: _Programme) -> Indices:
 
 
 def _relaxation(programme: _Programme) -> tuple[float, Floats]:
-    """The length of the shortest fractional tour, and by how much longer each edge (m,) that it
-    lacks would make it; cuts are added to the programme.
+    """Return the length of the shortest fractional tour, and by how much longer each edge (m,) that
+    it lacks would make it; cuts are added to the programme.
     """
     while True:
-        result = _solved(
-            linprog(
-                programme.lengths,
-                A_ub=-programme.cuts,
-                b_ub=np.full(len(programme.sets), -2.0),
-                A_eq=programme.degrees,
-                b_eq=np.full(programme.count, 2.0),
-                bounds=(0, 1),
-                method="highs",
-            )
+        result = linprog(
+            programme.lengths,
+            A_ub=-programme.cuts,
+            b_ub=np.full(len(programme.sets), -2.0),
+            A_eq=programme.degrees,
+            b_eq=np.full(programme.count, 2.0),
+            bounds=(0, 1),
+            method="highs",
         )
+        if result.x is None:
+            raise CogmapError(f"no shortest tour: {result.message}")
         violated = _violated_sets(programme.graph(result.x))
         if not violated:
             return float(result.fun), np.asarray(result.lower.marginals)
@@ -131,7 +129,7 @@ def _relaxation(programme: _Programme) -> tuple[float, Floats]:
 
 
 def _whole(programme: _Programme) -> Floats | None:
-    """Which edges (m,) the shortest tour has, 1 or 0, None where there is no tour of them."""
+    """Choose the edges (m,) of the shortest tour, 1 or 0; None if there is no tour of them."""
     while True:
         leaves_sets = LinearConstraint(programme.cuts, 2, np.inf)
         result = milp(
@@ -152,7 +150,7 @@ def _whole(programme: _Programme) -> Floats | None:
 
 
 def _violated_sets(graph: csr_array) -> list[Booleans]:
-    """Sets of goals that a fractional tour leaves by less than two edges."""
+    """Return sets of goals that a fractional tour leaves by less than two edges."""
     parts, part = connected_components(graph, directed=False)
     if parts > 1:
         return [part == number for number in range(parts)]
@@ -165,23 +163,21 @@ def _violated_sets(graph: csr_array) -> list[Booleans]:
     for goal in range(1, graph.shape[0]):
         flow = maximum_flow(capacities, 0, goal)
         if flow.flow_value < 2 * _CAPACITY - _MIN_VIOLATION:
-            members = _reached(capacities - flow.flow)
+            # The goals that more could flow to from goal 0.
+            residual = capacities - flow.flow
+            residual.data[residual.data < 0] = 0
+            residual.eliminate_zeros()
+            members = np.zeros(residual.shape[0], bool)
+            members[breadth_first_order(residual, 0, return_predecessors=False)] = True
             violated[members.tobytes()] = members
 
     return list(violated.values())
 
 
-def _reached(residual: csr_array) -> Booleans:
-    """The goals that more could flow to from goal 0."""
-    residual.data[residual.data < 0] = 0
-    residual.eliminate_zeros()
-    reached = np.zeros(residual.shape[0], bool)
-    reached[breadth_first_order(residual, 0, return_predecessors=False)] = True
-    return reached
-
-
 def _visited(graph: csr_array) -> Indices:
-    """The goals in the order of the tour that the graph consists of, to the nearer number first."""
+    """Return the goals in the order of the tour that the graph consists of, to the nearer number
+    first.
+    """
     order = [0]
     before = -1
 
@@ -193,10 +189,3 @@ def _visited(graph: csr_array) -> Indices:
         if following[0] == 0:
             return np.array(order, np.int64)
         order.append(following[0])
-
-
-def _solved(result: OptimizeResult) -> OptimizeResult:
-    """The result. Raises CogmapError where there is none."""
-    if result.x is None:
-        raise CogmapError(f"no shortest tour: {result.message}")
-    return result

@@ -30,34 +30,23 @@ class Tours(NamedTuple):
 
 
 def tours_of(lengths: Floats, positions: Floats, number: int, seed: int) -> Tours:
-    """Closed tours of `number` participants, by true (n, n) lengths and (n, 2) positions."""
+    """Plan closed tours of `number` participants, by true (n, n) lengths and (n, 2) positions."""
     tours = Tours([], [], [])
 
     for participant in range(number):
         rng = np.random.default_rng([seed, participant])
         start = int(rng.integers(len(lengths)))
         goals = np.roll(np.arange(len(lengths)), -start)
-        hierarchical, straightened, flat = _orders(
-            lengths[np.ix_(goals, goals)], positions[goals], rng
-        )
+
+        judged = _judged(lengths[np.ix_(goals, goals)], rng)
+        turned = _turned(positions[goals], rng)
+        limits = TourSettings(span=int(rng.choice(SPANS)))
+        hierarchical = order(judged, turned, limits._replace(straightens=False))
         tours.hierarchical.append(goals[hierarchical])
-        tours.straightened.append(goals[straightened])
-        tours.flat.append(goals[flat])
+        tours.straightened.append(goals[order(judged, turned, limits)])
+        tours.flat.append(goals[follow_activation(judged)])
 
     return tours
-
-
-def _orders(
-    lengths: Floats, positions: Floats, rng: np.random.Generator
-) -> tuple[Indices, Indices, Indices]:
-    """The order (n,) of one participant by each plan."""
-    judged = _judged(lengths, rng)
-    seen = _turned(positions, rng)
-    limits = TourSettings(span=int(rng.choice(SPANS)))
-
-    hierarchical = order(judged, seen, limits._replace(straightens=False))
-    straightened = order(judged, seen, limits)
-    return hierarchical, straightened, follow_activation(judged)
 
 
 def _judged(lengths: Floats, rng: np.random.Generator) -> Floats:

@@ -49,10 +49,11 @@ class GridModule:
         return self.spacing_m * triangular
 
     def tuning(self, where_m: Values) -> npt.NDArray[np.float32]:
-        """How much of its peak each cell fires at positions (n, 2): (cells, n), 1 in the middle of
-        a field.
+        """Return how much of its peak each cell fires at positions (n, 2): (cells, n), 1 in the
+        middle of a field.
         """
-        own_rad = self._phases_rad(self._centres_m())
+        centres_m = _pairs(np.arange(PHASES) / PHASES) @ self.lattice_m.T
+        own_rad = self._phases_rad(centres_m)
         there_rad = self._phases_rad(where_m)
         waves, cells = own_rad.shape
         total = np.full((cells, len(where_m)), -waves, np.float32)
@@ -65,25 +66,16 @@ class GridModule:
         return np.asarray(share, np.float32)
 
     def _phases_rad(self, where_m: Values) -> npt.NDArray[np.float32]:
-        """(3, n): the phase of each wave at positions (n, 2)."""
-        phases_rad = where_m @ self._waves().T
-        return phases_rad.astype(np.float32).T
-
-    def _centres_m(self) -> Values:
-        """(cells, 2): a field of each cell."""
-        shares = np.arange(PHASES) / PHASES
-        return _pairs(shares) @ self.lattice_m.T
-
-    def _waves(self) -> Values:
-        """(3, 2): the wave vectors, in radians a metre, whose sum peaks in the fields."""
+        """Return the phases (3, n) at positions (n, 2) of three waves, whose sum peaks in the
+        fields.
+        """
         angles_rad = np.radians([30, 90, 150])
-        x = np.cos(angles_rad)
-        y = np.sin(angles_rad)
-        directions = np.column_stack([x, y])
-
+        directions = np.column_stack([np.cos(angles_rad), np.sin(angles_rad)])
         two_rows_m = np.sqrt(3) * self.spacing_m
         rad_per_m = 4 * np.pi / two_rows_m
-        return np.asarray(rad_per_m * directions)
+
+        phases_rad: Values = where_m @ (rad_per_m * directions).T
+        return phases_rad.astype(np.float32).T
 
     def nearest(self, centres_m: Values) -> Indices:
         """Of positions (n, 2), the cell that has a field there."""
@@ -103,12 +95,14 @@ class BorderCells:
 
     @property
     def distances_m(self) -> Values:
-        """What each cell prefers."""
+        """Return what each cell prefers."""
         end_m = self.farthest_m + BORDER_M / 2
         return np.arange(0.0, end_m, BORDER_M)
 
     def tuning(self, sensed_m: float, sd_m: float) -> npt.NDArray[np.float32]:
-        """How much of its peak each cell fires at a sensed distance of that precision: (cells,)."""
+        """Return how much of its peak each cell fires at a sensed distance of that precision:
+        (cells,).
+        """
         deviations = (self.distances_m - sensed_m) / sd_m
         share = np.exp(-(deviations**2) / 2)
         return share.astype(np.float32)
@@ -120,7 +114,7 @@ class BorderCells:
 
 
 def place_centres_m(side_m: float) -> Values:
-    """Where place cells have their fields in a square room: (n, 2), PLACE_M apart."""
+    """Return where place cells have their fields in a square room: (n, 2), PLACE_M apart."""
     line_m = np.arange(PLACE_M / 2, side_m, PLACE_M)
     return _pairs(line_m)
 

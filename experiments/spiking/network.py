@@ -63,7 +63,9 @@ class Posterior:
         return np.sqrt(variances_m2)
 
     def off(self, mean_m: Values) -> float:
-        """How far another mean is from this one's, in its standard deviations (Mahalanobis)."""
+        """Return how far another mean is from this one's, in its standard deviations
+        (Mahalanobis).
+        """
         offset_m = mean_m - self.mean_m
         precision = np.linalg.inv(self.covariance_m2)
         mahalanobis2 = offset_m @ precision @ offset_m
@@ -101,13 +103,13 @@ class Recording:
 
     @property
     def counts(self) -> Values:
-        """How often each place cell fired."""
+        """Return how often each place cell fired."""
         counts = np.bitwise_count(self.place).sum(axis=1)
         return np.asarray(counts, np.float64)
 
     @property
     def posterior(self) -> Posterior:
-        """Of the samples that place cells' spikes are. Raises ValueError where there are fewer than
+        """Of the samples that place cells' spikes are. Raises ValueError if there are fewer than
         two.
         """
         counts = self.counts
@@ -121,12 +123,13 @@ class Recording:
 
 
 def record(cues: Cues, side_m: float, seconds: float, rng: np.random.Generator) -> Recording:
-    """The network's spikes in a square room of `side_m`, as long as `seconds`."""
+    """Return the network's spikes in a square room of `side_m`, as long as `seconds`."""
     cycles = round(seconds / GAMMA_S)
     centres_m = place_centres_m(side_m)
     integrated_m = rng.multivariate_normal(cues.mean_m, cues.covariance_m2, cycles)
 
-    place = _in_every_cycle(len(centres_m), cycles)
+    # Packed, all ones: a place cell fires in the cycles in which each of its inputs does.
+    place: Spikes = np.full((len(centres_m), math.ceil(cycles / 8)), 0xFF, np.uint8)
     grid = []
     border = []
 
@@ -145,9 +148,3 @@ def record(cues: Cues, side_m: float, seconds: float, rng: np.random.Generator) 
         border.append(spikes)
 
     return Recording(tuple(grid), tuple(border), place, centres_m)
-
-
-def _in_every_cycle(cells: int, cycles: int) -> Spikes:
-    """Packed spikes of cells that fire in all of so many cycles."""
-    groups = math.ceil(cycles / 8)
-    return np.full((cells, groups), 0xFF, np.uint8)

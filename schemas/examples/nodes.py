@@ -18,6 +18,7 @@ from cogmap.schemas.nodes import (
     AnyNode,
     Attention,
     Correction,
+    CostLayer,
     Episode,
     Goal,
     LoopClosure,
@@ -217,7 +218,6 @@ def _goal() -> Goal:
         y_m=-3.25,
         after=goal_id("school"),
         reached_ns=1_000_000_000,
-        doubts=2,
         need="energy",
         **_USUAL,
     )
@@ -235,6 +235,7 @@ def _plan() -> Plan:
         planned_ns=1_000_000_000,
         length_m=42.5,
         route=matrix(3, 2),
+        detour_for={CostLayer.OBSTACLE: 180.0},
         **_USUAL,
     )
 

@@ -52,7 +52,7 @@ from cogmap.schemas.nodes.ids import (
 )
 from cogmap.schemas.nodes.links import EXCLUSIVE_LINKS, LinkKind
 from cogmap.schemas.nodes.path import Correction, LoopClosure, Observations, PathSegment
-from cogmap.schemas.nodes.planning import Goal, Plan, PlanState
+from cogmap.schemas.nodes.planning import MAX_DETOUR_M, CostLayer, Goal, Plan, PlanState
 from cogmap.schemas.nodes.recollection import Recollection, SubMap
 from cogmap.schemas.nodes.rules import KINDS, AnyNode, KindRules, kind_name, kind_of
 from cogmap.schemas.nodes.situation import (
@@ -71,6 +71,7 @@ __all__ = [
     "EXCLUSIVE_LINKS",
     "FUNCTIONS",
     "KINDS",
+    "MAX_DETOUR_M",
     "NEVER_NS",
     "PLAN_ID",
     "POSE_COLUMNS",
@@ -84,6 +85,7 @@ __all__ = [
     "Attention",
     "Correction",
     "CorrectionColumn",
+    "CostLayer",
     "Episode",
     "Goal",
     "GraphNode",

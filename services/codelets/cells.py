@@ -2,12 +2,34 @@
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Iterator
 
-from cogmap.geometry.arrays import Singles
+import numpy as np
+import numpy.typing as npt
+
+from cogmap.geometry.arrays import Indices, Singles
 from cogmap.graph.window import Window
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Cells, Operation
+from cogmap.schemas.nodes import ROOT_MAP, PlaceColumn
+
+# The workspace takes no more at once.
+MAX_CELLS = 2**16
+
+
+def written_cells(
+    column: PlaceColumn, cells: Indices, values: npt.ArrayLike
+) -> Iterator[Operation]:
+    """The operations that write (k,) values in (k, 2) cells of a column of the root map."""
+    new = np.asarray(values, np.float32)
+    for start in range(0, len(cells), MAX_CELLS):
+        some = slice(start, start + MAX_CELLS)
+        yield Cells(
+            map=ROOT_MAP,
+            column=column,
+            cells=Array.of(cells[some], "<i4"),
+            values=Array.of(new[some]),
+        )
 
 
 def changed_cells(map_id: str, known: Window, after: Singles) -> list[Operation]:

@@ -80,11 +80,15 @@ class Worker:
         return proposals
 
     def _run(self, task: Task) -> Proposal:
-        """The proposal for a task; a failure is part of it."""
+        """Return the proposal for a task; a failure is part of it."""
         answer = Answer()
         failure = ""
         try:
-            answer = self._codelet(task).run(task, self._graph)
+            codelet = self._codelets.get(task.codelet)
+            if codelet is None:
+                there_are = ", ".join(self._codelets)
+                raise MessageError(f"no codelet {task.codelet}: there are {there_are}")
+            answer = codelet.run(task, self._graph)
         except MessageError as error:
             failure = f"{task.codelet}: {error}"
         except Exception as error:  # another package's codelet may raise anything: it is named here
@@ -100,14 +104,6 @@ class Worker:
             events=answer.events,
             failure=failure,
         )
-
-    def _codelet(self, task: Task) -> ConfiguredCodelet:
-        codelet = self._codelets.get(task.codelet)
-        if codelet is None:
-            there_are = ", ".join(self._codelets)
-            raise MessageError(f"no codelet {task.codelet}: there are {there_are}")
-
-        return codelet
 
 
 def build(instance: str, codelets: Iterable[ConfiguredCodelet]) -> Module:

@@ -12,8 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from cogmap.estimation.alignment import motion_onto
 from cogmap.geometry.arrays import Floats, Indices
-from cogmap.geometry.se2 import motion_onto, rotate, transform_from, wrap_angle
+from cogmap.geometry.se2 import rotate, transform_from, wrap_angle
 
 NEAREST_PAIR_M = 6.0
 FARTHEST_PAIR_M = 80.0

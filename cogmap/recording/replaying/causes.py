@@ -22,9 +22,9 @@ from cogmap.schemas.topics import SNAPSHOT
 
 
 def jobs(reader: LogReader, modules: Sequence[str], progress: Progress | None = None) -> list[Job]:
-    """The jobs that replay `modules`, in the order of the log.
+    """Return the jobs that replay `modules`, in the order of the log.
 
-    Raises LogError where one of them published nothing in it.
+    Raises LogError if one of them published nothing in it.
     """
     records = list(reader.records(progress=progress))
     has_envelopes = all(record.envelope is not None for record in records)
@@ -52,40 +52,37 @@ class _Planner:
 
     @property
     def sources(self) -> list[str]:
-        """Every instance that published something."""
+        """Return every instance that published something."""
         return sorted(self._published)
 
     def jobs(self, source: str, module: str) -> list[Job]:
-        """A job for each incarnation of an instance in which something happened."""
+        """Return a job for each incarnation of an instance in which something happened."""
         found: list[Job] = []
         earlier: list[Record] = []
         for number, incarnation in enumerate(sorted(self._published[source])):
             published = sorted(self._published[source][incarnation], key=_sent_ns)
             job = Job(module, source, number, earlier=list(earlier))
-            self._fill(job, published)
+            inputs = _Inputs(self._by_cause, incarnation)
+            numbered = []
+            for record in published:
+                envelope = _envelope(record)
+                numbered.append((envelope.seq, without_envelope(record)))
+                for cause in envelope.causes:
+                    step = _step(cause, inputs, envelope.sent_ns)
+                    if step is None:
+                        job.missing[cause[0]] += 1
+                    else:
+                        job.steps.append(step)
+
+            job.expected = of_model(numbered)
             if job.steps or job.expected:
                 found.append(job)
             earlier += [without_envelope(record) for record in published]
         return found
 
-    def _fill(self, job: Job, published: list[Record]) -> None:
-        """Add what led to the messages that the job's incarnation published, and these."""
-        inputs = _Inputs(self._by_cause, _envelope(published[0]).incarnation)
-        numbered = []
-        for record in published:
-            envelope = _envelope(record)
-            numbered.append((envelope.seq, without_envelope(record)))
-            for cause in envelope.causes:
-                step = _step(cause, inputs, envelope.sent_ns)
-                if step is None:
-                    job.missing[cause[0]] += 1
-                else:
-                    job.steps.append(step)
-        job.expected = of_model(numbered)
-
 
 def _step(cause: Cause, inputs: _Inputs, before_ns: int) -> Step | None:
-    """What `cause` names, before the message that names it; None where the log lacks it."""
+    """Return what `cause` names, before the message that names it; None if the log lacks it."""
     name, _, number = cause
     if name == START:
         return Step(Kind.START)
@@ -113,7 +110,7 @@ class _Inputs:
         self._last: dict[tuple[str, str], int] = {}
 
     def find(self, cause: Cause) -> Record | None:
-        """The message that `cause` names; None where the log lacks it."""
+        """Return the message that `cause` names; None if the log lacks it."""
         topic, source, seq = cause
         candidates = self._by_cause.get(cause)
         if not candidates:
@@ -122,19 +119,18 @@ class _Inputs:
         record = candidates[0]
         if len(candidates) > 1:
             record = self._choose(candidates, cause)
-        self._enter(source, _envelope(record).incarnation)
+        incarnation = _incarnation(record)
+        if self._incarnation.get(source) != incarnation:
+            # The numbers of a source's earlier incarnations say nothing about this one.
+            self._incarnation[source] = incarnation
+            self._last = {key: last for key, last in self._last.items() if key[1] != source}
         self._last[topic, source] = seq
         return record
 
-    def _enter(self, source: str, incarnation: int) -> None:
-        """Forget the numbers of a source's earlier incarnations."""
-        if self._incarnation.get(source) == incarnation:
-            return
-        self._incarnation[source] = incarnation
-        self._last = {key: last for key, last in self._last.items() if key[1] != source}
-
     def _choose(self, candidates: list[Record], cause: Cause) -> Record:
-        """The candidate of the first incarnation that it can be of; the last one if none can."""
+        """Return the candidate of the first incarnation that it can be of; the last one if none
+        can.
+        """
         topic, source, seq = cause
         current = self._incarnation.get(source)
         if current is None:

@@ -27,13 +27,15 @@ class Difference(msgspec.Struct, frozen=True):
     more: str = ""
 
     def in_words(self, sides: Sides) -> str:
-        """A clause, with the names of the two sides."""
+        """Return a clause, with the names of the two sides."""
         left_side, right_side = sides
         return f"{self.path} is {self.left} in {left_side}, {self.right} in {right_side}{self.more}"
 
 
 def difference(left: Any, right: Any, path: str = "") -> Difference | None:
-    """Where two messages, or two parts at `path`, first differ; None where they hold the same."""
+    """Return where two messages, or two parts at `path`, first differ; None if they hold the
+    same.
+    """
     if type(left) is not type(right):
         return Difference(path or "its kind", _short(left), _short(right))
     for kind, compare in _COMPARISONS:
@@ -46,7 +48,7 @@ def difference(left: Any, right: Any, path: str = "") -> Difference | None:
 
 
 def describe(topic: Topic, left: bytes, right: bytes, sides: Sides) -> str:
-    """A sentence on two messages of `topic` whose bytes differ: which, and where first."""
+    """Return a sentence on two messages of `topic` whose bytes differ: which, and where first."""
     try:
         first = decode(topic, left)
         second = decode(topic, right)
@@ -62,7 +64,7 @@ def describe(topic: Topic, left: bytes, right: bytes, sides: Sides) -> str:
 
 
 def title(topic: Topic, message: Message) -> str:
-    """A message's topic, number, source and stamp."""
+    """Return a message's topic, number, source and stamp."""
     stamp_s = message.stamp_ns / 1e9
     return f"{topic.name} number {message.seq} of {message.source} (stamp {stamp_s:.3f} s)"
 
@@ -121,7 +123,7 @@ def _in_array(left: Array | Matrix, right: Array | Matrix, path: str) -> Differe
 
 
 def _raw(array: Array | Matrix) -> np.ndarray[Any, Any]:
-    """The values as bytes, so that NaN equals NaN and -0.0 differs from 0.0."""
+    """Return the values as bytes, so that NaN equals NaN and -0.0 differs from 0.0."""
     size = int(array.dtype[2])
     return np.frombuffer(array.data, f"V{size}")
 
@@ -138,7 +140,7 @@ def _short(value: Any) -> str:
 
 
 def _first_byte(left: bytes, right: bytes) -> int:
-    """The index of the first byte that differs; the shorter length where there is none."""
+    """Return the index of the first byte that differs; the shorter length if none does."""
     for index, (one, other) in enumerate(zip(left, right, strict=False)):
         if one != other:
             return index

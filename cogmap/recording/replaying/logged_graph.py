@@ -27,22 +27,34 @@ class LoggedGraph:
         self._position = 0
 
     def at(self, version: int, before_ns: int) -> Snapshot:
-        """The last graph at `version` that was committed before a time.
+        """Return the last graph at `version` that was committed before a time.
 
-        Raises LogError where the log does not hold every delta up to it.
+        Raises LogError if the log does not hold every delta up to it.
         """
         if self._commits is None:
             self._commits = self._read()
-        position = self._find(self._commits, version, before_ns)
+        positions = (
+            position
+            for position, commit in reversed(list(enumerate(self._commits, start=1)))
+            if commit.delta.version == version and commit.sent_ns <= before_ns
+        )
+        position = next(positions, 0)
         if position < self._position:
             self._graph = Graph()
             self._position = 0
 
+        # After a gap the graph is not known, until a workspace begins anew.
         for commit in self._commits[self._position : position]:
-            self._apply(commit.delta)
+            if commit.delta.version == 1:
+                self._graph = Graph()
+            self._graph.apply(commit.delta)
+
         self._position = position
-        if self._graph.version != version:
-            raise self._lacking(version)
+        if not position or self._graph.version != version:
+            raise LogError(
+                f"{self._reader.path}: a module loaded the graph at version {version}, and the log "
+                f"does not hold every delta up to it: record from the start of the workspace"
+            )
         return self._graph.snapshot()
 
     def _read(self) -> list[_Commit]:
@@ -53,23 +65,3 @@ class LoggedGraph:
             sent_ns = record.log_time_ns if record.envelope is None else record.envelope.sent_ns
             commits.append(_Commit(delta, sent_ns))
         return commits
-
-    def _find(self, commits: list[_Commit], version: int, before_ns: int) -> int:
-        """The number of deltas from the log's first to the one that committed `version`."""
-        for index in range(len(commits) - 1, -1, -1):
-            commit = commits[index]
-            if commit.delta.version == version and commit.sent_ns <= before_ns:
-                return index + 1
-        raise self._lacking(version)
-
-    def _apply(self, delta: Delta) -> None:
-        """Apply a delta. After a gap the graph is not known, until a workspace begins anew."""
-        if delta.version == 1:
-            self._graph = Graph()
-        self._graph.apply(delta)
-
-    def _lacking(self, version: int) -> LogError:
-        return LogError(
-            f"{self._reader.path}: a module loaded the graph at version {version}, and the log "
-            f"does not hold every delta up to it: record from the start of the workspace"
-        )

@@ -38,9 +38,14 @@ class ModuleRun:
     def replay(self) -> Outcome:
         """Do every step, compare every output, and count those that are missing.
 
-        Raises LogError where the log lacks deltas of the graph that the module follows.
+        Raises LogError if the log lacks deltas of the graph that the module follows.
         """
-        self._restore()
+        # The module begins with the journal that it had when it was started.
+        restore = self._module.restore
+        past = [one for one in self._job.earlier if one.topic is self._module.journal]
+        if past and restore is not None:
+            restore(self._reader.message(record) for record in past)
+
         for step in self._job.steps:
             for message in self._do(step):
                 self._compare(message)
@@ -49,45 +54,38 @@ class ModuleRun:
         self.outcome.notes += self._notes()
         return self.outcome
 
-    def _restore(self) -> None:
-        """Hand the module the journal that it had when it was started."""
-        restore = self._module.restore
-        journal = self._module.journal
-        past = [record for record in self._job.earlier if record.topic is journal]
-        if past and restore is not None:
-            restore(self._reader.message(record) for record in past)
-
     def _do(self, step: Step) -> list[Message]:
-        """What the module publishes at a step. An exception is a difference: then it had none."""
+        """Return what the module publishes at a step. An exception is a difference: then it had
+        none.
+        """
         try:
-            return self._step(step)
+            if step.record is not None:
+                return self._feed(step.record)
+            if step.kind is Kind.SNAPSHOT:
+                return self._load(step)
+            if step.kind is Kind.START:
+                start = self._module.start
+                return [] if start is None else self._module.stamp(start())
+
+            timers = self._module.timers
+            if len(timers) == 1:
+                return self._module.stamp(timers[0].handler(step.at_ns))
+            self._untimed += 1
+            return []
         except LogError:
             raise
         except Exception as error:
-            refusal = self._refusal(step, error)
+            name = step.kind.name.lower() if step.record is None else step.record.topic.name
+            reason = f"{type(error).__name__}: {error}"
+            refusal = f"{name}: {self._job.instance} refuses what it received: {reason}"
             if self._job.exact:
                 self._differ(refusal)
             else:
                 self._refusals.append(refusal)
             return []
 
-    def _refusal(self, step: Step, error: Exception) -> str:
-        name = step.kind.name.lower()
-        if step.record is not None:
-            name = step.record.topic.name
-        kind = type(error).__name__
-        return f"{name}: {self._job.instance} refuses what it received: {kind}: {error}"
-
-    def _step(self, step: Step) -> list[Message]:
-        if step.record is not None:
-            return self._feed(step.record)
-        if step.kind is Kind.SNAPSHOT:
-            return self._load(step)
-        if step.kind is Kind.START:
-            return self._start()
-        return self._call_timer(step)
-
     def _feed(self, record: Record) -> list[Message]:
+        """Feed a message. Raises LogError if the module's graph lacks deltas before this one."""
         if record.topic not in self._module.handlers:
             if self._job.exact:
                 raise MessageError("it does not handle this topic")
@@ -96,20 +94,14 @@ class ModuleRun:
         self.outcome.fed += 1
         message = self._reader.message(record)
         published = self._module.feed(message)
-        if isinstance(message, Delta):
-            self._check_graph(message)
-        return published
-
-    def _check_graph(self, delta: Delta) -> None:
-        """Raise LogError where the module's graph lacks deltas before this one."""
         graph = self._module.graph
-        if graph is None or graph.version >= delta.version:
-            return
-        raise LogError(
-            f"{self._reader.path}: {self._job.instance} follows the graph, and the log lacks "
-            f"the deltas {graph.version + 1} to {delta.version - 1}: "
-            f"record from the start of the workspace"
-        )
+        if isinstance(message, Delta) and graph is not None and graph.version < message.version:
+            raise LogError(
+                f"{self._reader.path}: {self._job.instance} follows the graph, and the log lacks "
+                f"the deltas {graph.version + 1} to {message.version - 1}: "
+                f"record from the start of the workspace"
+            )
+        return published
 
     def _load(self, step: Step) -> list[Message]:
         """Load the graph as the log's own deltas made it."""
@@ -118,17 +110,6 @@ class ModuleRun:
             raise MessageError("it does not follow the graph")
         graph.load(self._logged_graph.at(step.version, step.at_ns))
         return self._module.loaded()
-
-    def _start(self) -> list[Message]:
-        start = self._module.start
-        return [] if start is None else self._module.stamp(start())
-
-    def _call_timer(self, step: Step) -> list[Message]:
-        timers = self._module.timers
-        if len(timers) != 1:
-            self._untimed += 1
-            return []
-        return self._module.stamp(timers[0].handler(step.at_ns))
 
     def _compare(self, message: Message) -> None:
         """Compare what was published with the message of that number in the log."""
@@ -161,16 +142,13 @@ class ModuleRun:
 
         self.outcome.missing_outputs = len(missing)
         if missing and not self.outcome.first:
-            self._name_missing(min(missing, key=_order))
-
-    def _name_missing(self, record: Record) -> None:
-        message = self._reader.message(record)
-        title = compare.title(record.topic, message)
-        log, replay = SIDES
-        self._differ(f"{title} is in {log} and not published in {replay}")
+            first = min(missing, key=lambda one: (one.log_time_ns, one.channel, one.sequence))
+            title = compare.title(first.topic, self._reader.message(first))
+            log, replay = SIDES
+            self._differ(f"{title} is in {log} and not published in {replay}")
 
     def _notes(self) -> list[str]:
-        """What else is to be known before the outcome is judged."""
+        """Return what else is to be known before the outcome is judged."""
         notes = []
         if self.outcome.missing_inputs:
             missing = sorted(self.outcome.missing_inputs.items())
@@ -187,7 +165,8 @@ class ModuleRun:
             notes.append(
                 f"{self._untimed} calls of a timer left out: the module has {timers} timers"
             )
-        late = self._late_topics()
+        expected = self._job.expected
+        late = sorted(name for name in expected if self._job.exact and min(expected[name]) > 0)
         if late:
             notes.append(
                 f"the log begins after the module did: "
@@ -195,17 +174,6 @@ class ModuleRun:
             )
         return notes
 
-    def _late_topics(self) -> list[str]:
-        """The topics whose first output is not in the log."""
-        if not self._job.exact:
-            return []
-        expected = self._job.expected
-        return sorted(name for name in expected if min(expected[name]) > 0)
-
     def _differ(self, sentence: str) -> None:
         if not self.outcome.first:
             self.outcome.first = sentence
-
-
-def _order(record: Record) -> tuple[int, int, int]:
-    return record.log_time_ns, record.channel, record.sequence

@@ -18,11 +18,11 @@ class Control(Protocol):
 
     @property
     def asked(self) -> bool:
-        """Whether to end."""
+        """Return if it is asked to end."""
 
     @property
     def paused(self) -> bool:
-        """Whether to stand still."""
+        """Return if it is asked to stand still."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait so long, or until asked to end, to pause or to continue. Returns whether to end."""
@@ -75,40 +75,27 @@ class Pacer:
         self._next_clock_ns = 0
 
     def wait_until(self, log_time_ns: int, clock: ClockPublisher | None) -> bool:
-        """Wait until it is `log_time_ns`; `clock` publishes meanwhile. False where asked to end."""
+        """Wait until it is `log_time_ns`; `clock` publishes meanwhile. Return False if asked to
+        end.
+        """
         due_ns = int((log_time_ns - self._start_log_ns) / self._rate)
         while not self._control.asked:
+            now_ns = time.monotonic_ns() - self._start_ns
             if self._control.paused:
-                self._pause()
+                # The pause is left out of the time.
+                self._control.wait(_PAUSE_S)
+                self._start_ns = time.monotonic_ns() - now_ns
                 continue
 
-            now_ns = self._now_ns()
-            self._publish(clock, now_ns)
+            until_ns = due_ns
+            if clock is not None:
+                if now_ns >= self._next_clock_ns:
+                    clock.publish()
+                    self._next_clock_ns = max(self._next_clock_ns + clock.period_ns, now_ns)
+                until_ns = min(due_ns, self._next_clock_ns)
+
             if now_ns >= due_ns:
-                late_s = (now_ns - due_ns) / 1e9
-                self.late_max_s = max(self.late_max_s, late_s)
+                self.late_max_s = max(self.late_max_s, (now_ns - due_ns) / 1e9)
                 return True
-            self._wait(due_ns, clock, now_ns)
+            self._control.wait(max(0, until_ns - now_ns) / 1e9)
         return False
-
-    def _pause(self) -> None:
-        """Wait, and leave the wait out of the time."""
-        paused_ns = self._now_ns()
-        self._control.wait(_PAUSE_S)
-        self._start_ns += self._now_ns() - paused_ns
-
-    def _publish(self, clock: ClockPublisher | None, now_ns: int) -> None:
-        if clock is None or now_ns < self._next_clock_ns:
-            return
-        clock.publish()
-        self._next_clock_ns = max(self._next_clock_ns + clock.period_ns, now_ns)
-
-    def _wait(self, due_ns: int, clock: ClockPublisher | None, now_ns: int) -> None:
-        until_ns = due_ns
-        if clock is not None:
-            until_ns = min(due_ns, self._next_clock_ns)
-        wait_ns = max(0, until_ns - now_ns)
-        self._control.wait(wait_ns / 1e9)
-
-    def _now_ns(self) -> int:
-        return time.monotonic_ns() - self._start_ns

@@ -60,19 +60,22 @@ class Job:
 
     @property
     def input_bytes(self) -> int:
-        """How much it receives."""
+        """Return how much it receives."""
         return sum(step.record.size for step in self.steps if step.record is not None)
 
 
 def modules_of(reader: LogReader, sources: Sequence[str], modules: Sequence[str]) -> dict[str, str]:
-    """Which of `modules` each of `sources` is an instance of, by source.
+    """Return which of `modules` each of `sources` is an instance of, by source: as the recorder saw
+    it or, otherwise, by its name, such as `codelets-2`.
 
-    Raises LogError where one of `modules` has no instance.
+    Raises LogError if one of `modules` has no instance.
     """
-    recorded = _recorded_members(reader)
+    members = [facts for name, facts in reader.metadata if name == layout.MEMBER]
+    recorded = {facts.get("instance", ""): facts.get("module", "") for facts in members}
     found: dict[str, str] = {}
     for source in sources:
-        module = recorded.get(source) or _module_by_name(source, modules)
+        named = (one for one in modules if source == one or source.startswith(f"{one}-"))
+        module = recorded.get(source) or next(named, "")
         if module in modules:
             found[source] = module
 
@@ -86,7 +89,9 @@ def modules_of(reader: LogReader, sources: Sequence[str], modules: Sequence[str]
 
 
 def of_model(records: Iterable[tuple[int, Record]]) -> Expected:
-    """The records (number, record) whose bytes a replay must reproduce, by topic and number."""
+    """Return the records (number, record) whose bytes a replay must reproduce, by topic and
+    number.
+    """
     expected: Expected = defaultdict(dict)
     for seq, record in records:
         if record.topic.scope is Scope.MODEL:
@@ -95,12 +100,12 @@ def of_model(records: Iterable[tuple[int, Record]]) -> Expected:
 
 
 def without_envelope(record: Record) -> Record:
-    """A record as a job keeps it: its envelope is not needed to feed it."""
+    """Return a record as a job keeps it: its envelope is not needed to feed it."""
     return replace(record, envelope=None)
 
 
 def inexact_jobs(reader: LogReader, records: Sequence[Record], modules: Sequence[str]) -> list[Job]:
-    """Jobs for a log without envelopes: each instance receives all, in the order of the log."""
+    """Plan for a log without envelopes: each instance receives all, in the order of the log."""
     published: dict[str, list[tuple[int, Record]]] = defaultdict(list)
     order: list[tuple[str, Record]] = []
     for record in records:
@@ -113,31 +118,10 @@ def inexact_jobs(reader: LogReader, records: Sequence[Record], modules: Sequence
     for source, module in modules_of(reader, sorted(published), modules).items():
         steps = [Step(Kind.START)]
         for publisher, record in order:
-            if _receives(source, publisher, record):
+            # An instance may have received all but its own; of presence, only what it observed.
+            is_own = publisher == source
+            if is_own == (record.topic is PRESENCE):
                 steps.append(Step(Kind.FEED, record))
         expected = of_model(published[source])
         found.append(Job(module, source, 0, steps, expected, exact=False))
     return found
-
-
-def _receives(source: str, publisher: str, record: Record) -> bool:
-    """Whether an instance may have received a message: of presence, only its own observations."""
-    is_own = publisher == source
-    return is_own if record.topic is PRESENCE else not is_own
-
-
-def _recorded_members(reader: LogReader) -> dict[str, str]:
-    """The module of each instance that the recorder saw."""
-    members = {}
-    for name, facts in reader.metadata:
-        if name == layout.MEMBER:
-            members[facts.get("instance", "")] = facts.get("module", "")
-    return members
-
-
-def _module_by_name(source: str, modules: Iterable[str]) -> str:
-    """Which of `modules` the name of an instance, such as `codelets-2`, stands for; "" for none."""
-    for module in modules:
-        if source == module or source.startswith(f"{module}-"):
-            return module
-    return ""

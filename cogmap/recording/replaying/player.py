@@ -48,7 +48,7 @@ class Played(msgspec.Struct, kw_only=True):
 class Player:
     """Publishes the messages of `reader` on `bus`, each when it is due.
 
-    Raises UsageError where the rate is not above 0.
+    Raises UsageError if the rate is not above 0.
     """
 
     def __init__(self, reader: LogReader, bus: Bus, choices: Choices, control: Control) -> None:
@@ -86,21 +86,18 @@ class Player:
         )
 
     def _chosen(self) -> list[Topic]:
-        """What of the log is played, in the order of the table."""
+        """Return what of the log is played, in the order of the table. The log's clock is not if
+        the player has its own.
+        """
         recorded = {channel.topic for channel in self._reader.channels.values()}
-        chosen = []
-        for topic in topics.ALL:
-            if topic.name in recorded and self._is_chosen(topic):
-                chosen.append(topic)
-        return chosen
-
-    def _is_chosen(self, topic: Topic) -> bool:
         chosen = self._choices.topics
-        if topic is topics.CLOCK and self._choices.clock_hz > 0:
-            return False
         if chosen is None:
-            return topic.scope is not Scope.PROCESS
-        return topic in chosen
+            chosen = [topic for topic in topics.ALL if topic.scope is not Scope.PROCESS]
+
+        found = [topic for topic in topics.ALL if topic.name in recorded and topic in chosen]
+        if self._choices.clock_hz > 0:
+            found = [topic for topic in found if topic is not topics.CLOCK]
+        return found
 
     def _play_once(self) -> None:
         """Play the log once; the clock ends with its newest stamp.
@@ -123,23 +120,15 @@ class Player:
             self._clock.publish()
 
     def _publish(self, record: Record) -> None:
+        """Publish a message in an envelope of today, which is as old as it was then."""
         stub = self._reader.stub(record)
-        recorded = record.envelope
-        if recorded is None:
-            time_of_log_ns = record.log_time_ns
-            recorded = Envelope(stub.source, stub.seq, 0, time_of_log_ns, time_of_log_ns)
+        then_ns = record.log_time_ns
+        recorded = record.envelope or Envelope(stub.source, stub.seq, 0, then_ns, then_ns)
 
-        self._bus.publish(record.topic, self._reader.payload(record), self._renewed(recorded))
-        self._played[record.topic_name] += 1
-        if self._clock is not None:
-            self._clock.see(stub.stamp_ns)
-
-    def _renewed(self, recorded: Envelope) -> Envelope:
-        """An envelope of today, for a message that is as old when it is sent as it was then."""
         now_ns = time_ns()
         age_ns = max(0, recorded.sent_ns - recorded.born_ns)
         key = (recorded.source, recorded.incarnation)
-        return Envelope(
+        renewed = Envelope(
             source=recorded.source,
             seq=recorded.seq,
             incarnation=self._incarnations.setdefault(key, now_ns),
@@ -148,3 +137,7 @@ class Player:
             stages=recorded.stages,
             causes=recorded.causes,
         )
+        self._bus.publish(record.topic, self._reader.payload(record), renewed)
+        self._played[record.topic_name] += 1
+        if self._clock is not None:
+            self._clock.see(stub.stamp_ns)

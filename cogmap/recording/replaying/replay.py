@@ -36,15 +36,18 @@ def replay_into(
     """Feed every recorded instance of `modules` what it received, and compare what it publishes.
 
     `build` makes a module from its name, the recorded configuration with `overrides`, and an
-    instance's name. `processes` None takes several where the log is long. Raises LogError, also
-    where the log lacks deltas of a graph that a module follows, and ConfigError.
+    instance's name. `processes` None takes several if the log is long. Raises LogError, also
+    if the log lacks deltas of a graph that a module follows, and ConfigError.
     """
     began_s = time.perf_counter()
     reader = LogReader(path)
     sections = _merged(recorded_config(reader), overrides or {})
     todo = jobs(reader, list(dict.fromkeys(modules)))
     work = partial(run_job, path=path, build=build, sections=sections)
-    outcomes = _run_all(todo, work, _process_count(todo, processes), progress)
+    if processes is None:
+        input_bytes = sum(job.input_bytes for job in todo)
+        processes = (os.cpu_count() or 1) if input_bytes >= _MIN_PARALLEL_BYTES else 1
+    outcomes = _run_all(todo, work, processes, progress)
 
     wall_s = time.perf_counter() - began_s
     log_s = reader.span_s
@@ -69,18 +72,11 @@ def run_job(job: Job, path: Path, build: Build, sections: Sections) -> Outcome:
 
 
 def _merged(sections: Sections, overrides: Sections) -> Sections:
-    """`sections`, with the keys of `overrides` in place of theirs."""
+    """Return `sections`, with the keys of `overrides` in place of theirs."""
     merged = {name: dict(section) for name, section in sections.items()}
     for name, section in overrides.items():
         merged.setdefault(name, {}).update(section)
     return merged
-
-
-def _process_count(todo: list[Job], wanted: int | None) -> int:
-    if wanted is not None:
-        return wanted
-    input_bytes = sum(job.input_bytes for job in todo)
-    return (os.cpu_count() or 1) if input_bytes >= _MIN_PARALLEL_BYTES else 1
 
 
 def _run_all(
@@ -89,7 +85,7 @@ def _run_all(
     processes: int,
     progress: Progress | None,
 ) -> list[Outcome]:
-    """Every job's outcome, in the order of `todo`; the longest begin first."""
+    """Return every job's outcome, in the order of `todo`; the longest begin first."""
     order = sorted(range(len(todo)), key=lambda index: -_cost(todo[index]))
     longest_first = [todo[index] for index in order]
     done = list(accumulate(_cost(job) for job in longest_first))
@@ -105,5 +101,5 @@ def _run_all(
 
 
 def _cost(job: Job) -> int:
-    """How long a job takes, beside others."""
+    """Return how long a job takes, beside others."""
     return 1 + job.input_bytes + len(job.steps)

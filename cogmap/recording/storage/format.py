@@ -49,19 +49,19 @@ class EnvelopeRecord(msgspec.Struct, kw_only=True):
 
     @classmethod
     def of(cls, topic: Topic, envelope: Envelope) -> EnvelopeRecord:
-        """The record of `envelope`, which came with a message on `topic`."""
+        """Return the record of `envelope`, which came with a message on `topic`."""
         facts = asdict(envelope)
         return cls(topic=topic.name, **facts)
 
     def envelope(self) -> Envelope:
-        """The envelope that it was made of."""
+        """Return the envelope that it was made of."""
         facts = asdict(self)
         del facts["topic"]
         return Envelope(**facts)
 
 
 def topics_to_record() -> list[Topic]:
-    """Every topic of the table that belongs in a log, in the table's order."""
+    """Return every topic of the table that belongs in a log, in the table's order."""
     return [
         topic
         for topic in topics.ALL
@@ -70,22 +70,24 @@ def topics_to_record() -> list[Topic]:
 
 
 def schema_of(topic: Topic) -> tuple[str, bytes]:
-    """The name and the JSON Schema of what `topic` carries."""
+    """Return the name and the JSON Schema of what `topic` carries."""
     schema = msgspec.json.encode(json_schema(topic))
     return topic.type.__name__, schema
 
 
 def envelope_schema() -> tuple[str, bytes]:
-    """The name and the JSON Schema of what the channel of envelopes carries."""
+    """Return the name and the JSON Schema of what the channel of envelopes carries."""
     schema = msgspec.json.encode(msgspec.json.schema(EnvelopeRecord))
     return EnvelopeRecord.__name__, schema
 
 
 def time_field(time_ns: int) -> int:
-    """`time_ns` limited to MCAP's range; the exact time is in the envelope."""
+    """Return `time_ns` limited to MCAP's range; the exact time is in the envelope."""
     return min(max(time_ns, 0), MAX_TIME_NS)
 
 
 def sequence_field(seq: int) -> int:
-    """The low 32 bits of `seq`, as MCAP keeps it; the number itself is in envelope and message."""
+    """Return the low 32 bits of `seq`, as MCAP keeps it; the number itself is in envelope and
+    message.
+    """
     return seq & _MAX_SEQUENCE

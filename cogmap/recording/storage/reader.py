@@ -73,7 +73,7 @@ class LogReader:
     """The log at `path`. `cut_bytes` at its end belong to no whole record: it was cut off, or is
     being written.
 
-    Raises LogError where it is missing, foreign, of a version that is not read here, or damaged;
+    Raises LogError if it is missing, foreign, of a version that is not read here, or damaged;
     damage is found when the chunk concerned is read.
     """
 
@@ -89,7 +89,7 @@ class LogReader:
         check_readable(path, index.library, self.about(layout.RECORDING).get("software", ""))
 
     def about(self, name: str) -> dict[str, str]:
-        """The last metadata record called `name`, empty where there is none."""
+        """Return the last metadata record called `name`, empty if there is none."""
         for found, facts in reversed(self.metadata):
             if found == name:
                 return facts
@@ -118,7 +118,7 @@ class LogReader:
         start_ns: int = 0,
         end_ns: int = layout.MAX_TIME_NS + 1,
     ) -> Iterator[Record]:
-        """Messages on `topics`, on all known ones where it is None, in order of log time.
+        """Yield messages on `topics`, on all known ones if it is None, in order of log time.
 
         Those of log times from `start_ns` (inclusive) to `end_ns` (exclusive); chunks without any
         are not read. Those of one time come as they were written. `progress` is called with the
@@ -150,7 +150,7 @@ class LogReader:
         yield from self._with_envelopes(waiting, topics)
 
     def payload(self, record: Record) -> bytes:
-        """The bytes of a message, as they travelled.
+        """Return the bytes of a message, as they travelled.
 
         Quick where records are asked for roughly in order: the last few chunks are kept. Raises
         LogError.
@@ -160,11 +160,13 @@ class LogReader:
         return data
 
     def message(self, record: Record) -> Message:
-        """The message, decoded. Raises LogError; MessageError where it does not fit its topic."""
+        """Return the message, decoded. Raises LogError; MessageError if it does not fit its
+        topic.
+        """
         return decode(record.topic, self.payload(record))
 
     def stub(self, record: Record) -> Message:
-        """What every message has: its stamp, number and source. Raises LogError."""
+        """Return what every message has: its stamp, number and source. Raises LogError."""
         try:
             return _stub_decoder.decode(self.payload(record))
         except msgspec.DecodeError as error:
@@ -202,12 +204,14 @@ class LogReader:
             )
 
     def _topic_name(self, message: Written) -> str:
-        """The topic of a message's channel, empty where nothing declares that channel."""
+        """Return the topic of a message's channel, empty if nothing declares that channel."""
         channel = self.channels.get(message.channel_id)
         return "" if channel is None else channel.topic
 
     def _messages(self, number: int) -> list[Written]:
-        """The messages in a chunk, envelopes among them, from the cache where they are there."""
+        """Return the messages in a chunk, envelopes among them, from the cache if they are
+        there.
+        """
         cached = self._cache.get(number)
         if cached is not None:
             self._cache.move_to_end(number)

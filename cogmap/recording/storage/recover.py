@@ -46,14 +46,14 @@ class Recovery(msgspec.Struct, kw_only=True):
 
     @property
     def whole(self) -> bool:
-        """Whether nothing was wrong with the file."""
+        """Return if nothing was wrong with the file."""
         return not self.damaged
 
 
 def recover(source: Path, target: Path, progress: Progress | None = None) -> Recovery:
     """Write every message of `source` that can be read into a new log at `target`.
 
-    Raises LogError where there is no log at `source`, or `target` exists or cannot be written.
+    Raises LogError if there is no log at `source`, or `target` exists or cannot be written.
     """
     found = LogBytes(source)
     stream = open_new(target)
@@ -81,10 +81,20 @@ class _Rescue:
         self._run_bytes = 0
 
     def run(self, progress: Progress | None) -> Recovery:
-        """Copy all; what was saved."""
-        self._writer.start(layout.PROFILE, self._library())
+        """Copy all that can be read. The new log names the program that wrote the old one, which
+        determines its messages.
+        """
+        first = next(self._source.all_records(_ignore), None)
+        header = None if first is None else self._parsed(first)
+        library = header.library if isinstance(header, Header) else layout.SOFTWARE
+        self._writer.start(layout.PROFILE, library)
+
         for span in self._source.all_records(self._lose):
-            self._try_to_copy(span)
+            try:
+                self._copy(self._source.parse(span))
+            except DamageError as error:
+                self._lose(span.offset, span.end, str(error))
+                self._last_chunk_lost = span.opcode == Opcode.CHUNK
             if progress is not None:
                 progress(span.end / self._source.size)
         self._copy_run()
@@ -93,20 +103,6 @@ class _Rescue:
         self._writer.add_metadata("recovered", facts)
         self._writer.finish()  # type: ignore[no-untyped-call]
         return self._recovery
-
-    def _library(self) -> str:
-        """The program that wrote the log, which determines its messages; ours if damaged."""
-        for span in self._source.all_records(_ignore):
-            header = self._parsed(span)
-            return header.library if isinstance(header, Header) else layout.SOFTWARE
-        return layout.SOFTWARE
-
-    def _try_to_copy(self, span: RecordSpan) -> None:
-        try:
-            self._copy(self._source.parse(span))
-        except DamageError as error:
-            self._lose(span.offset, span.end, str(error))
-            self._last_chunk_lost = span.opcode == Opcode.CHUNK
 
     def _copy(self, record: McapRecord | None) -> None:
         """Copy what a record holds. Raises DamageError."""
@@ -122,7 +118,11 @@ class _Rescue:
                 if self._run_bytes >= RUN_BYTES:
                     self._copy_run()
             case MessageIndex() if self._last_chunk_lost:
-                self._count_lost(record)
+                if record.channel_id not in self._channels:
+                    self._read_summary()
+                lost = self._channels.get(record.channel_id)
+                if lost is None or lost.topic != layout.ENVELOPES:
+                    self._recovery.lost_messages += len(record.records)
             case Metadata():
                 self._writer.add_metadata(record.name, record.metadata)
 
@@ -134,15 +134,30 @@ class _Rescue:
         self._copy_records(run)
 
     def _copy_records(self, contents: list[McapRecord]) -> None:
+        """Copy messages as a chunk. Raises DamageError if nothing that can be read declares a
+        channel of theirs.
+        """
         messages = messages_in(contents)
         self._schemas |= {record.id: record for record in contents if isinstance(record, Schema)}
         self._channels |= channels_in(contents)
-        self._check_channels(messages)
+        used = {message.channel_id for message in messages}
+        if not used <= self._channels.keys():
+            self._read_summary()
+        for missing in sorted(used - self._channels.keys()):
+            raise DamageError(f"nothing that can be read declares its channel {missing}")
         if not messages:
             return
 
         for identifier in sorted(self._channels.keys() - self._written.keys()):
-            self._write_channel(self._channels[identifier])
+            channel = self._channels[identifier]
+            schema = self._schemas.get(channel.schema_id)
+            schema_id = 0
+            if schema is not None:
+                schema_id = self._writer.register_schema(schema.name, schema.encoding, schema.data)
+            self._written[identifier] = self._writer.register_channel(
+                channel.topic, channel.message_encoding, schema_id, channel.metadata
+            )
+
         for message in messages:
             self._writer.add_message(
                 self._written[message.channel_id],
@@ -157,23 +172,6 @@ class _Rescue:
         self._writer.flush()  # type: ignore[no-untyped-call]
         self._recovery.chunks += 1
 
-    def _check_channels(self, messages: list[Message]) -> None:
-        """Raise DamageError where nothing that can be read declares a message's channel."""
-        used = {message.channel_id for message in messages}
-        if not used <= self._channels.keys():
-            self._read_summary()
-        for channel in sorted(used - self._channels.keys()):
-            raise DamageError(f"nothing that can be read declares its channel {channel}")
-
-    def _write_channel(self, channel: Channel) -> None:
-        schema = self._schemas.get(channel.schema_id)
-        schema_id = 0
-        if schema is not None:
-            schema_id = self._writer.register_schema(schema.name, schema.encoding, schema.data)
-        self._written[channel.id] = self._writer.register_channel(
-            channel.topic, channel.message_encoding, schema_id, channel.metadata
-        )
-
     def _read_summary(self) -> None:
         """Take channels and schemas from the file's end: what declared them is damaged."""
         for span in self._source.all_records(_ignore):
@@ -184,20 +182,11 @@ class _Rescue:
                 self._schemas[record.id] = record
 
     def _parsed(self, span: RecordSpan) -> McapRecord | None:
-        """A record's content, None where it is damaged."""
+        """Return a record's content, None if it is damaged."""
         try:
             return self._source.parse(span)
         except DamageError:
             return None
-
-    def _count_lost(self, index: MessageIndex) -> None:
-        identifier = index.channel_id
-        if identifier not in self._channels:
-            self._read_summary()
-
-        channel = self._channels.get(identifier)
-        if channel is None or channel.topic != layout.ENVELOPES:
-            self._recovery.lost_messages += len(index.records)
 
     def _lose(self, start: int, end: int, reason: str) -> None:
         recovery = self._recovery
@@ -206,4 +195,4 @@ class _Rescue:
 
 
 def _ignore(_start: int, _end: int, _reason: str) -> None:
-    """What is lost was counted already."""
+    """Ignore what is lost: it was counted already."""

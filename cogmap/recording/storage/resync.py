@@ -52,7 +52,7 @@ class RecordSpan:
 
 
 class LogBytes:
-    """The bytes of a log, mapped. Raises LogError where there is no file, or it is not MCAP."""
+    """The bytes of a log, mapped. Raises LogError if there is no file, or it is not MCAP."""
 
     def __init__(self, path: Path) -> None:
         check_magic(path)
@@ -64,7 +64,9 @@ class LogBytes:
         self.size = len(self._bytes)
 
     def records_from(self, offset: int) -> Iterator[RecordSpan]:
-        """The whole records from `offset` on, up to the footer or to bytes that are no record."""
+        """Yield the whole records from `offset` on, up to the footer or to bytes that are no
+        record.
+        """
         while offset + _HEAD.size <= self.size:
             opcode, length = _HEAD.unpack_from(self._bytes, offset)
             start = offset + _HEAD.size
@@ -78,7 +80,9 @@ class LogBytes:
             offset = end
 
     def parse(self, span: RecordSpan) -> McapRecord | None:
-        """A record's content; None for a kind that recovery does not need. Raises DamageError."""
+        """Return a record's content; None for a kind that recovery does not need. Raises
+        DamageError.
+        """
         kind = _KINDS.get(span.opcode)
         if kind is None:
             return None
@@ -92,7 +96,9 @@ class LogBytes:
         return record
 
     def all_records(self, lose: Lose) -> Iterator[RecordSpan]:
-        """Every record that can be found; calls `lose` (from byte, to byte, why) for the rest."""
+        """Yield every record that can be found; calls `lose` (from byte, to byte, why) for the
+        rest.
+        """
         offset = len(MCAP0_MAGIC)
         while offset < self.size:
             reached = offset
@@ -111,25 +117,23 @@ class LogBytes:
         lose(self.size, self.size, "the file is cut off here")
 
     def _records_up_to_damage(self, offset: int) -> Iterator[RecordSpan]:
-        """The records from `offset` on, up to one whose length reaches over the next chunk."""
+        """Yield the records from `offset` on, up to one whose length reaches over the next
+        chunk.
+        """
         for span in self.records_from(offset):
-            if not self._is_followed(span):
+            # If neither a record nor the end of the file follows, the length may be wrong.
+            is_last = span.opcode == Opcode.FOOTER or span.end == self.size
+            if not is_last and not self._begins_record(span.end):
                 inside = self._next_chunk(span.offset + 1)
                 if inside is not None and inside < span.end:
                     return
             yield span
 
-    def _is_followed(self, span: RecordSpan) -> bool:
-        """Whether a record or the end of the file follows: if not, the length may be wrong."""
-        if span.opcode == Opcode.FOOTER or span.end == self.size:
-            return True
-        return self._begins_record(span.end)
-
     def _begins_record(self, offset: int) -> bool:
         return next(self.records_from(offset), None) is not None
 
     def _next_chunk(self, offset: int) -> int | None:
-        """Where the first chunk at or after `offset` begins that could be whole."""
+        """Return where the first chunk at or after `offset` begins that could be whole."""
         for found in _COMPRESSION.finditer(self._bytes, offset):
             start = found.start() - _COMPRESSION_AT
             is_chunk = start >= offset and self._bytes[start] == Opcode.CHUNK

@@ -17,7 +17,7 @@ class Stream:
     """The numbers of one source on one topic in one incarnation.
 
     `missing` are spans [start, end) of numbers up to `last` that have not come. `earlier` counts
-    the messages that the source published in earlier incarnations, UNKNOWN where it does not.
+    the messages that the source published in earlier incarnations, UNKNOWN if it does not.
     """
 
     topic: Topic
@@ -29,7 +29,7 @@ class Stream:
 
     @property
     def lost(self) -> int:
-        """How many numbers are missing."""
+        """Return how many numbers are missing."""
         lost = 0
         for start, end in self.missing:
             lost += end - start
@@ -40,7 +40,12 @@ class Stream:
         if seq > self.last + 1:
             self.missing.append((self.last + 1, seq))
         elif seq <= self.last:
-            self._found(seq)
+            spans: list[Span] = []
+            for start, end in self.missing:
+                is_in = start <= seq < end
+                parts = ((start, seq), (seq + 1, end)) if is_in else ((start, end),)
+                spans += [part for part in parts if part[0] < part[1]]
+            self.missing = spans
         self.last = max(self.last, seq)
 
     def end(self, published: int) -> None:
@@ -49,17 +54,6 @@ class Stream:
         if published > awaited:
             self.missing.append((awaited, published))
             self.last = published - 1
-
-    def _found(self, seq: int) -> None:
-        """Take one number out of the missing ones."""
-        spans: list[Span] = []
-        for start, end in self.missing:
-            if start <= seq < end:
-                parts = (start, seq), (seq + 1, end)
-                spans += [part for part in parts if part[0] < part[1]]
-            else:
-                spans.append((start, end))
-        self.missing = spans
 
 
 class SequenceTracker:
@@ -83,7 +77,7 @@ class SequenceTracker:
             stream.follow(envelope.seq)
 
     def _begun(self, topic: Topic, envelope: Envelope) -> Stream:
-        """The stream that begins with a message; the source's stream before it has ended.
+        """Return the stream that begins with a message; the source's stream before it has ended.
 
         What came before the message is missing if it should be there.
         """
@@ -112,13 +106,15 @@ class SequenceTracker:
         return [self._streams[key] for key in sorted(self._streams)]
 
     def gaps(self) -> list[str]:
-        """A sentence for each stream that misses numbers, those of NEVER_DROP topics first."""
+        """Return a sentence for each stream that misses numbers, those of NEVER_DROP topics
+        first.
+        """
         broken = [stream for stream in self.streams if stream.missing]
         broken.sort(key=lambda stream: stream.topic.delivery is not Delivery.NEVER_DROP)
         return [_sentence(stream) for stream in broken]
 
     def lost(self) -> dict[str, int]:
-        """How many messages are missing, by topic."""
+        """Return how many messages are missing, by topic."""
         lost: dict[str, int] = {}
         for stream in self.streams:
             if stream.missing:
@@ -128,7 +124,9 @@ class SequenceTracker:
 
 
 def _sentence(stream: Stream) -> str:
-    spans = [_numbers(span) for span in stream.missing[:_MAX_SPANS]]
+    spans = []
+    for start, end in stream.missing[:_MAX_SPANS]:
+        spans.append(f"{start}" if start == end - 1 else f"{start} to {end - 1}")
     rest = len(stream.missing) - _MAX_SPANS
     more = f" and {rest} more spans" if rest > 0 else ""
     topic = stream.topic
@@ -136,11 +134,3 @@ def _sentence(stream: Stream) -> str:
         f"{topic.name} ({topic.delivery.value}): {stream.lost} of {stream.source} missing, "
         f"number {', '.join(spans)}{more}"
     )
-
-
-def _numbers(span: Span) -> str:
-    start, end = span
-    last = end - 1
-    if start == last:
-        return f"{start}"
-    return f"{start} to {last}"

@@ -14,7 +14,7 @@ Release = tuple[int, int]
 
 
 def check_readable(path: Path, library: str, recorded_by: str) -> None:
-    """Raise LogError where the log at `path` is not ours, or of a version that is not read here.
+    """Raise LogError if the log at `path` is not ours, or of a version that is not read here.
 
     `library` is the header's; `recorded_by` the recording's own, which wins as tools that copy a
     log put their own name into the header. Before 1.0 each minor version may change what travels.

@@ -49,7 +49,9 @@ class WriteQueue:
             self._changed.notify()
 
     def take(self, timeout_s: float | None) -> Arrival | Job | None:
-        """The oldest arrival or job; None where none comes within `timeout_s` (None: no limit)."""
+        """Return the oldest arrival or job; None if none comes within `timeout_s` (None: no
+        limit).
+        """
         with self._changed:
             if not self._waiting and timeout_s != 0:
                 self._changed.wait_for(lambda: bool(self._waiting), timeout_s)

@@ -27,7 +27,7 @@ class LogWriter:
     """A log being written at `path`, with a channel for each of `topics` in that order.
 
     `about` goes into the file as the facts of the recording. A chunk ends with a call of `flush`,
-    which `write` makes by itself after CHUNK_BYTES. Every method raises LogError where the disk
+    which `write` makes by itself after CHUNK_BYTES. Every method raises LogError if the disk
     refuses; the log holds what was flushed before, and the writer is of no more use.
     """
 
@@ -116,7 +116,7 @@ class FlushTimer:
         self._next_s = time.monotonic() + FLUSH_S
 
     def due_in_s(self) -> float:
-        """Seconds until it is time to flush, 0 where it is."""
+        """Seconds until it is time to flush, 0 if it is."""
         return max(0.0, self._next_s - time.monotonic())
 
     def reset(self) -> None:
@@ -125,7 +125,7 @@ class FlushTimer:
 
 
 def open_new(path: Path) -> BinaryIO:
-    """A new file to write to, in a folder made where there is none. Raises LogError."""
+    """Return a new file to write to, in a folder made where there is none. Raises LogError."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -140,7 +140,7 @@ def open_new(path: Path) -> BinaryIO:
 
 
 def cannot_write(path: Path, error: OSError) -> LogError:
-    """The error for a file that the disk did not take, with what to do about it."""
+    """Return the error for a file that the disk did not take, with what to do about it."""
     if error.errno in _FULL:
         remedy = "free some space, or write to another disk"
     else:

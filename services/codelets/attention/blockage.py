@@ -42,7 +42,12 @@ def blocked_places(scan: Array, agent: Self, graph: Graph) -> list[str]:
     cell_m = graph.cell_m(agent.map)
     blocked = []
     for lane in lanes(agent, graph):
-        near = _in_sight(lane, agent)
+        # The places that the agent looks along from not too far, the nearest first.
+        away_m, slant_rad, _ = _as_seen(lane, agent)
+        is_near = (away_m >= NEAREST_M) & (away_m <= FARTHEST_M) & (slant_rad <= MAX_SLANT_RAD)
+        order = np.argsort(away_m[is_near], kind="stable")
+        seen = lane.where(is_near)
+        near = Lane(seen.position_m[order], seen.heading_rad[order])
         places_m = near.position_m[_is_blocked(near, rays, agent)]
         for x_m, y_m in places_m[:1].tolist():
             blocked.append(place_id(round(x_m / cell_m), round(y_m / cell_m), agent.map))
@@ -65,7 +70,7 @@ def expected_by(place: str, graph: Graph) -> str:
 
 
 def is_known(place: str, noted: Mapping[str, int], since_cycle: int, cell_m: float) -> bool:
-    """If a place node is near one that was noted, by its id, in `since_cycle` or later."""
+    """Return whether a place node is near one that was noted in `since_cycle` or later, by id."""
     here = place_cell(place)
     for known, cycle in noted.items():
         there = place_cell(known)
@@ -75,16 +80,6 @@ def is_known(place: str, noted: Mapping[str, int], since_cycle: int, cell_m: flo
             return True
 
     return False
-
-
-def _in_sight(lane: Lane, agent: Self) -> Lane:
-    """The places of a lane, the nearest first, that the agent looks along from not too far."""
-    away_m, slant_rad, _ = _as_seen(lane, agent)
-    is_in_sight = (away_m >= NEAREST_M) & (away_m <= FARTHEST_M) & (slant_rad <= MAX_SLANT_RAD)
-
-    seen = lane.where(is_in_sight)
-    order = np.argsort(away_m[is_in_sight], kind="stable")
-    return Lane(seen.position_m[order], seen.heading_rad[order])
 
 
 def _is_blocked(lane: Lane, rays: Floats, agent: Self) -> Booleans:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import msgspec
 import numpy as np
 
@@ -14,7 +12,6 @@ from cogmap.schemas.codelets import Task
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import SELF_ID, AnyNode, Attention, Object, Self, object_id
-from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.attention.coalitions import coalition, felt
 from cogmap.services.codelets.attention.pending import (
     brought,
@@ -24,6 +21,7 @@ from cogmap.services.codelets.attention.pending import (
     with_pending,
     without_conscious,
 )
+from cogmap.services.codelets.nodes import nodes_of
 
 NAME = "danger"
 AHEAD = "ahead"
@@ -35,7 +33,7 @@ SAME_CYCLES = 25
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task if something stands near ahead, and until that is conscious."""
+    """Return one task if something stands near ahead, and until that is conscious."""
     if graph.agent is None or context.scan is None:
         return []
     if is_refractory(NAME, graph, context.cycle):
@@ -63,9 +61,9 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
         return kept(memory, graph)
 
     content: list[AnyNode] = [felt(agent, BAD)]
-    nearest = _nearest_object(task.percepts, graph)
-    if nearest is not None:
-        content.append(felt(nearest, BAD))
+    by_range = sorted(task.percepts, key=lambda each: (each.range_m, each.label))
+    names = [object_id(each.label) for each in by_range if each.has_range]
+    content += [felt(node, BAD) for node in nodes_of(graph, Object, names)[:1]]
 
     found = coalition(
         NAME,
@@ -88,8 +86,8 @@ CODELET = Codelet(
 
 
 def is_blocked(task: Task) -> bool:
-    """If the range scan has something near in the lane ahead, in two of its rays: one alone
-    may be noise.
+    """Return whether the range scan has something near in the lane ahead, in two of its rays: one
+    alone may be noise.
     """
     if task.scan is None:
         return False
@@ -99,16 +97,3 @@ def is_blocked(task: Task) -> bool:
     is_in_lane = np.abs(range_m * np.sin(bearing_rad)) < HALF_WIDTH_M
     is_near = (range_m > 0) & (ahead_m > 0) & (ahead_m <= NEAREST_M)
     return int((is_in_lane & is_near).sum()) > 1
-
-
-def _nearest_object(percepts: list[Percept], graph: Graph) -> Object | None:
-    """The object of the map that is perceived the nearest; None where there is none."""
-    nearest = None
-    nearest_m = math.inf
-    for percept in sorted(percepts, key=lambda each: each.label):
-        node = graph.get(Object, object_id(percept.label))
-        if node is not None and percept.has_range and percept.range_m < nearest_m:
-            nearest = node
-            nearest_m = percept.range_m
-
-    return nearest

@@ -130,7 +130,7 @@ def _absence(node: Object, agent: Self, rays: Floats, around: Iterable[Object]) 
 
 
 def _is_in_sight(node: Object, agent: Self, around: Iterable[Object]) -> bool:
-    """If nothing on the map hides the middle of an object."""
+    """Return whether nothing on the map hides the middle of an object."""
     away_m = math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m))
     middle_rad = math.atan2(SEEN_SHARE * node.width_m / 2, away_m)
     for other in around:

@@ -17,7 +17,7 @@ REFRACTORY_CYCLES = 10
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task if an episode was recalled just now, and the codelet does not wait."""
+    """Return one task if an episode was recalled just now, and the codelet does not wait."""
     if is_refractory(NAME, graph, context.cycle, REFRACTORY_CYCLES):
         return []
 

@@ -82,7 +82,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task in each cycle in which the agent knows where it is and sees how far it is free."""
+    """Return one task in each cycle in which the agent knows where it is and sees how far it is
+    free.
+    """
     agent = graph.agent
     if agent is None or agent.misfits.is_lost or context.scan is None:
         return []

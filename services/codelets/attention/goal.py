@@ -41,8 +41,8 @@ CHANGE_SALIENCE = 0.5
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task if there is a route to a goal or frontier, or a plan or goal has changed, and the
-    codelet does not wait.
+    """Return one task if there is a route to a goal or frontier, or a plan or goal has changed, and
+    the codelet does not wait.
     """
     if is_refractory(NAME, graph, context.cycle, REFRACTORY_CYCLES):
         return []
@@ -60,9 +60,16 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     """A coalition of the self, the plan and its next goal, and the goals that were reached."""
     agent = graph.agent
     plan = graph.get(Plan, PLAN_ID)
-    memory = _with_changes(without_conscious(memory_of(NAME, graph)), graph)
     if agent is None:
         return Answer()
+
+    # What has changed since it was noted is pending, and what is no more is not.
+    memory = without_conscious(memory_of(NAME, graph))
+    state = _state(graph)
+    changed = [name for name in state if memory.noted.get(name) != state[name]]
+    pending = {name: cycle for name, cycle in memory.pending.items() if name in state}
+    memory = msgspec.structs.replace(memory, noted=state, pending=pending)
+    memory = with_pending(memory, changed)
 
     content: list[AnyNode] = [agent]
     if plan is not None and (plan.state is PlanState.READY or PLAN_ID in memory.pending):
@@ -110,14 +117,3 @@ def _state(graph: Graph) -> dict[str, int]:
             state[goal.id] = goal.reached_ns
 
     return state
-
-
-def _with_changes(memory: Attention, graph: Graph) -> Attention:
-    """`memory`, in which what has changed since it was noted is pending, and what is no more is
-    not.
-    """
-    state = _state(graph)
-    changed = [name for name in state if memory.noted.get(name) != state[name]]
-    pending = {name: cycle for name, cycle in memory.pending.items() if name in state}
-    noted = msgspec.structs.replace(memory, noted=state, pending=pending)
-    return with_pending(noted, changed)

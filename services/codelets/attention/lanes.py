@@ -13,7 +13,7 @@ from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.graph.window import ROAD_FROM, Extent
 from cogmap.schemas.nodes import PLAN_ID, PathColumn, PlaceColumn, Plan, Self
-from cogmap.services.codelets.planning.driven import POSITION
+from cogmap.services.codelets.planning.place_cost import POSITION
 
 # A lane is straight that turns by no more so far before and behind. At a bend, what stands beyond
 # seems to stand across it.

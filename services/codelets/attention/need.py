@@ -41,12 +41,16 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     """When a need is high."""
 
     high_level: Annotated[
-        PositiveShare, Meta(description="Level from which on a need is high, above 0 to 1.")
-    ] = 0.5
+        PositiveShare,
+        Meta(
+            description="Level from which on a need is high: what is left then must suffice for "
+            "the way to what satisfies it, which may be far longer than straight."
+        ),
+    ] = 0.4
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task if a need is high, and the codelet does not wait."""
+    """Return one task if a need is high, and the codelet does not wait."""
     if is_refractory(NAME, graph, context.cycle, REFRACTORY_CYCLES):
         return []
 
@@ -97,23 +101,20 @@ def high_needs(graph: Graph, config: Config) -> list[nodes.Need]:
 
 def nearest_that_satisfies(need: nodes.Need, agent: Self, graph: Graph) -> Object | None:
     """The object of the agent's map that satisfies a need, as far as is known, and is the nearest
-    but for one that the plan has found no route to; None where none is known.
+    but for one that the plan has found no route to; None if none is known.
     """
     function = SATISFIED_BY.get(need.label)
     found = [node for node in graph.of_kind(Object) if node.function == function]
-    unreachable = _sought_in_vain(need, graph)
+
+    # The goal for the need is sought in vain if the plan has no route to it.
+    plan = graph.get(Plan, PLAN_ID)
+    goal = graph.get(Goal, goal_id(need.label))
+    unreachable = ""
+    if plan is not None and goal is not None and goal.id in plan.unreachable:
+        unreachable = object_id(goal.object)
 
     def order(node: Object) -> tuple[float, str]:
         return math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m)), node.id
 
     here = [node for node in found if node.map == agent.map and node.id != unreachable]
     return min(here, key=order, default=None)
-
-
-def _sought_in_vain(need: nodes.Need, graph: Graph) -> str:
-    """The object that is the goal for a need and has no route; empty where there is none."""
-    plan = graph.get(Plan, PLAN_ID)
-    goal = graph.get(Goal, goal_id(need.label))
-    if plan is None or goal is None or goal.id not in plan.unreachable:
-        return ""
-    return object_id(goal.object)

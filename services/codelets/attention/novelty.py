@@ -22,7 +22,7 @@ SECTION = NAME
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """What is new to the agent."""
+    """The views after which nothing is new to the agent."""
 
     novel_sightings: Annotated[
         int,
@@ -36,7 +36,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task if an object in view has been seen in few views, and the codelet does not wait."""
+    """Return one task if an object in view has been seen in few views, and the codelet does not
+    wait.
+    """
     if is_refractory(NAME, graph, context.cycle):
         return []
 

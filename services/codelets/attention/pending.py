@@ -1,5 +1,5 @@
-"""What an attention codelet keeps in the graph: its refractory period, and what is pending until it
-is conscious.
+"""The state of an attention codelet in the graph: its refractory period, and content that is
+pending until it is conscious.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ REFRACTORY_CYCLES = 1
 
 
 def memory_of(codelet: str, graph: Graph) -> Attention:
-    """What `codelet` keeps; nothing at first."""
+    """Return what `codelet` keeps; nothing at first."""
     identifier = attention_id(codelet)
     found = graph.get(Attention, identifier)
     if found is not None:
@@ -32,7 +32,7 @@ def memory_of(codelet: str, graph: Graph) -> Attention:
 def is_refractory(
     codelet: str, graph: Graph, cycle: int, refractory_cycles: int = REFRACTORY_CYCLES
 ) -> bool:
-    """If `codelet` has brought a coalition so few cycles ago that it waits in `cycle`."""
+    """Return whether `codelet` brought a coalition so few cycles ago that it waits in `cycle`."""
     brought = memory_of(codelet, graph).brought_cycle
     return brought > 0 and cycle - brought <= refractory_cycles
 

@@ -26,7 +26,9 @@ LOST = "lost"
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task while the agent is lost, and until consciousness has it that it is found again."""
+    """Return one task while the agent is lost, and until consciousness has it that it is found
+    again.
+    """
     agent = graph.agent
     if agent is None:
         return []

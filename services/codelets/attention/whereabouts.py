@@ -18,7 +18,7 @@ NAME = "whereabouts"
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task in each cycle."""
+    """Return one task in each cycle."""
     return [context.task(NAME, about=[SELF_ID], percepts=context.percepts.objects)]
 
 

@@ -7,13 +7,15 @@ of the recalled map, whose objects and place nodes are then known as if it had s
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
+from cogmap.graph.window import EVIDENCE_COLUMNS, WEIGHT_COLUMNS
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.codelets import Task
@@ -23,6 +25,7 @@ from cogmap.schemas.nodes import (
     PLAN_ID,
     RECOLLECTION_ID,
     ROOT_MAP,
+    TILE_SIDE,
     CorrectionColumn,
     Goal,
     GraphNode,
@@ -35,15 +38,16 @@ from cogmap.schemas.nodes import (
     Recollection,
     Self,
 )
+from cogmap.services.codelets.cells import written_cells
 from cogmap.services.codelets.correction.apply_correction import moved
 from cogmap.services.codelets.correction.place_columns import MOVED_COLUMNS
 from cogmap.services.codelets.correction.recalled_objects import recalled_objects
-from cogmap.services.codelets.correction.recalled_places import recalled_places
 from cogmap.services.codelets.correction.recalled_sub_maps import recalled_sub_maps
+from cogmap.services.codelets.mapping.evidence import weights_of
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task where a recalled map waits to be joined, and no correction to be applied."""
+    """Return one task if a recalled map waits to be joined, and no correction to be applied."""
     if RECOLLECTION_ID not in graph.nodes or CORRECTION_ID in graph.nodes:
         return []
     return [context.task(CODELET.name, about=[RECOLLECTION_ID])]
@@ -56,12 +60,31 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     if recalled is None or root is None:
         raise MessageError(f"task {task.task_id}: the map was joined before")
 
+    # A correction that moves everything into the recalled map's frame, in which the present one has
+    # this pose.
     pose = np.array([recalled.x_m, recalled.y_m, recalled.heading_rad])
+    row = np.zeros((1, len(CorrectionColumn)))
+    row[0, CorrectionColumn.NEW_X_M :] = pose
     operations: list[Operation] = [DropNode(id=RECOLLECTION_ID)]
     operations.append(msgspec.structs.replace(root, remembered=recalled.map))
-    operations += moved(graph, _as_correction(pose))
-    operations += _moved_goals(graph, pose)
-    operations += _moved_plan(graph, pose, task.stamp_ns)
+    operations += moved(graph, row)
+
+    for goal in graph.of_kind(Goal):
+        if not goal.object and goal.map == ROOT_MAP:
+            ((x_m, y_m),) = transform_from(pose, np.array([[goal.x_m, goal.y_m]])).tolist()
+            operations.append(msgspec.structs.replace(goal, x_m=x_m, y_m=y_m))
+
+    # The plan is driven until there is a better one. It is written as one that was made just
+    # before, so that one made in this very cycle is newer.
+    plan = graph.get(Plan, PLAN_ID)
+    if plan is not None and plan.map == ROOT_MAP:
+        route = None
+        if plan.route is not None:
+            route_m = np.asarray(plan.route.numpy(), np.float64)
+            route = Matrix.of(transform_from(pose, route_m))
+        planned_ns = task.stamp_ns - 1
+        operations.append(msgspec.structs.replace(plan, route=route, planned_ns=planned_ns))
+
     known = recalled_objects(recalled, graph, pose)
     operations += known
     objects = [each for each in known if isinstance(each, Object)]
@@ -82,37 +105,19 @@ CODELET = Codelet(
 )
 
 
-def _as_correction(pose: Floats) -> Floats:
-    """(1, 7): the row of a correction that moves everything into a frame in which the present one
-    has that pose.
+def recalled_places(recalled: Recollection) -> Iterator[Operation]:
+    """Return what is known of the recalled place nodes, and the weights of their links by the
+    evidence.
     """
-    row = np.zeros((1, len(CorrectionColumn)))
-    row[0, CorrectionColumn.NEW_X_M :] = pose
-    return row
+    weight_of = dict(zip(EVIDENCE_COLUMNS, WEIGHT_COLUMNS, strict=True))
+    corners = np.array(recalled.tiles).reshape(-1, 2) * TILE_SIDE
+    for column, matrix in recalled.columns.items():
+        every = np.asarray(matrix.numpy(), np.float32)
+        tile, number = np.nonzero(every)
+        i, j = np.divmod(number, TILE_SIDE)
+        cells = corners[tile] + np.column_stack([i, j])
+        values = every[tile, number]
 
-
-def _moved_goals(graph: Graph, pose: Floats) -> list[Operation]:
-    """The goals that are positions."""
-    operations: list[Operation] = []
-    for goal in graph.of_kind(Goal):
-        if not goal.object and goal.map == ROOT_MAP:
-            ((x_m, y_m),) = transform_from(pose, np.array([[goal.x_m, goal.y_m]])).tolist()
-            operations.append(msgspec.structs.replace(goal, x_m=x_m, y_m=y_m))
-
-    return operations
-
-
-def _moved_plan(graph: Graph, pose: Floats, stamp_ns: int) -> list[Operation]:
-    """The plan, which is driven on until there is a better one.
-
-    It is written as one that was made just before, so that one made in this very cycle is newer.
-    """
-    plan = graph.get(Plan, PLAN_ID)
-    if plan is None or plan.map != ROOT_MAP:
-        return []
-
-    route = None
-    if plan.route is not None:
-        route_m = np.asarray(plan.route.numpy(), np.float64)
-        route = Matrix.of(transform_from(pose, route_m))
-    return [msgspec.structs.replace(plan, route=route, planned_ns=stamp_ns - 1)]
+        yield from written_cells(column, cells, values)
+        if column in weight_of:
+            yield from written_cells(weight_of[column], cells, weights_of(values))

@@ -1,6 +1,6 @@
 """Places of the path that are joined into older ones where these stood already (beyond the paper).
 
-What is kept of the path is then bounded by the town, not by the time driven. Pure.
+The path then grows with the town, not with driving time. Pure.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from cogmap.services.codelets.mapping.path import JOINED, LAST, POSE, STAMP, ste
 
 SAME_M = 2.0
 SAME_RAD = np.pi / 8
-# By how much the pose that is believed of a place may be wrong, seen from the one it is joined to.
+# The error of a place's pose, seen from the place that it is joined to.
 JOIN_SD_M = 0.2
 JOIN_SD_RAD = 0.02
 IMPOSSIBLE_SD = 5.0
@@ -69,8 +69,8 @@ class Joining(NamedTuple):
 
 
 def joining(known: Floats, places: Floats, config: Config) -> Joining:
-    """Which of the places (n, COLUMNS) are joined into which of the `known` ones, (k, COLUMNS): the
-    nearest that the agent left `revisit_s` before at least, headed as it was then.
+    """Return which of the places (n, COLUMNS) are joined into which of the `known` ones, (k,
+    COLUMNS): the nearest that the agent left `revisit_s` before at least, headed as it was then.
     """
     into = np.full(len(places), STAYS)
     if not len(known):
@@ -134,17 +134,10 @@ def joins(joined: Joining, config: Config) -> Floats:
     is_between = stays[:-1] != stays[1:]
     is_successive = joined.places[1:, JOINED] == 0
     error = residuals(joined.places[:, POSE], steps)
-    is_believed = _is_possible(error, variance_m2, variance_rad2)
-    chosen: Floats = rows[is_between & is_successive & is_believed]
-    return chosen
 
-
-def _is_possible(error: Floats, variance_m2: Floats, variance_rad2: Floats) -> Booleans:
-    """(m,): whether path integration may have led from one place to the next as is believed, but
-    for (m, 3) errors. Where the agent was lost it was not at the place that it is joined into.
-    """
+    # If the agent was lost, it was not at the place that this one is joined into.
     squared_m2 = (error[:, :2] ** 2).sum(axis=1)
     squared = squared_m2 / variance_m2 + error[:, 2] ** 2 / variance_rad2
-
-    is_possible: Booleans = squared <= IMPOSSIBLE_SD**2
-    return is_possible
+    is_possible = squared <= IMPOSSIBLE_SD**2
+    chosen: Floats = rows[is_between & is_successive & is_possible]
+    return chosen

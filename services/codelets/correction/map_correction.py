@@ -11,7 +11,9 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
+from scipy.special import chdtri
 
+from cogmap.estimation.alignment import motion_onto
 from cogmap.estimation.gnc import inliers
 from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pairwise_consistency import MIN_AGREEING, Views, consistent
@@ -27,7 +29,6 @@ from cogmap.estimation.reverse_replay import close_loops, with_positions_only
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import (
     cumulative,
-    motion_onto,
     rotation_matrices,
     transform_from,
     wrap_angle,
@@ -47,7 +48,6 @@ from cogmap.schemas.nodes import (
     PathSegment,
 )
 from cogmap.services.codelets.config import SECTION, Config
-from cogmap.services.codelets.correction.deferral import FALSE_CLOSURE, may_be_deferred
 from cogmap.services.codelets.correction.joint import optimize_jointly
 from cogmap.services.codelets.correction.synapses import replay_of
 from cogmap.services.codelets.mapping.observations import Sightings
@@ -59,12 +59,18 @@ IMPOSSIBLE_SD = 5.0
 MAX_ROUNDS = 3
 SAME_RAD = 0.05
 SHORT_SEGMENTS = 8
+# A loop closure is rejected if a true one would misfit as much with a smaller probability.
+FALSE_CLOSURE = 1e-3
+# The path explains a closure whose misfit is at most this share of that at which it is rejected.
+EXPLAINED_MISFIT = 0.1
+# The path is corrected from this share of new closures on that it does not explain.
+UNEXPLAINED_SHARE = 0.1
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task if closures of the present pass were not judged yet, and enough of it are there to
-    agree; unless some were judged just now, a correction waits to be applied, or the path, part of
-    which is sparse, explains them.
+    """Return one task if closures of the present pass were not judged yet, and enough of it are
+    there to agree; unless some were judged just now, a correction waits to be applied, or the path,
+    part of which is sparse, explains them.
     """
     if CORRECTION_ID in graph.nodes:
         return []
@@ -94,7 +100,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """What becomes of all closures, the correction of the path, and its replay."""
+    """Return what becomes of all closures, the correction of the path, and its replay."""
     rows = rows_of(graph.of_kind(PathSegment))
     closures = sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns)
     if not closures or len(rows) < 2:
@@ -146,6 +152,21 @@ CODELET = Codelet(
 )
 
 
+def may_be_deferred(closures: list[LoopClosure], rows: Floats) -> bool:
+    """Return whether the path `rows`, as it is believed, explains all but a share of the closures,
+    or all but so few that they close no loop.
+    """
+    poses = rows[:, POSE]
+    views = views_of(closures, rows)
+    constraints = constraints_of(views, poses)
+    squared = mahalanobis2(residuals(poses, constraints), constraints.information)
+
+    degrees = np.where(views.has_heading, 3, 2)
+    misfit = squared / chdtri(degrees, FALSE_CLOSURE)
+    unexplained = int((misfit > EXPLAINED_MISFIT).sum())
+    return unexplained < max(MIN_AGREEING, UNEXPLAINED_SHARE * len(closures))
+
+
 class _Judgement(NamedTuple):
     """Which closures are consistent with one another (m,) and which are accepted (m,), and the path
     with those.
@@ -157,7 +178,7 @@ class _Judgement(NamedTuple):
 
 
 def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config) -> _Judgement:
-    """Which of the closures of a path are consistent, and of these accepted."""
+    """Return which of the closures of a path are consistent, and of these accepted."""
     rows = rows_of(path)
     steps = steps_of(rows, config)
     views = views_of(closures, rows)

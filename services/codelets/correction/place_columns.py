@@ -8,22 +8,20 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import move_with, rotate
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, LINK_OFFSETS, WEIGHT_COLUMNS
-from cogmap.schemas.array import Array
-from cogmap.schemas.graph import Cells, Operation
+from cogmap.schemas.graph import Operation
 from cogmap.schemas.nodes import ROOT_MAP, PlaceColumn
+from cogmap.services.codelets.cells import written_cells
 from cogmap.services.codelets.mapping.evidence import weights_of
 
 SHARE_COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE)
 MOVED_COLUMNS = (*SHARE_COLUMNS, *EVIDENCE_COLUMNS, *WEIGHT_COLUMNS)
 NEIGHBOURHOOD = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
-MAX_CELLS = 2**16
 OCTANT_RAD = np.pi / 4
 _KEY_STEP = 2**32
 _DIRECTIONS = len(LINK_OFFSETS)
@@ -55,8 +53,8 @@ class Movement:
         return moved_m / self._cell_m, after[:, 2] - before[:, 2]
 
 
-class Links(NamedTuple):
-    """Links by the direction, (k,), and the cell, (k, 2), that each belongs to."""
+class CellLinks(NamedTuple):
+    """CellLinks by the direction, (k,), and the cell, (k, 2), that each belongs to."""
 
     direction: Indices
     cells: Indices
@@ -65,7 +63,7 @@ class Links(NamedTuple):
         """(k,): a number for each link."""
         return _keys(self.cells) * _DIRECTIONS + self.direction
 
-    def moved(self, movement: Movement) -> Links:
+    def moved(self, movement: Movement) -> CellLinks:
         """The links nearest to where these move to."""
         offsets = LINK_OFFSETS[self.direction]
         middles, turned_rad = movement.moved(self.cells + offsets / 2)
@@ -76,17 +74,17 @@ class Links(NamedTuple):
         direction = octant % _DIRECTIONS
 
         cells = np.rint(middles - LINK_OFFSETS[direction] / 2)
-        return Links(direction, cells.astype(np.int64))
+        return CellLinks(direction, cells.astype(np.int64))
 
-    def neighbourhood(self) -> Links:
+    def neighbourhood(self) -> CellLinks:
         """These links and those of their direction in the eight cells around, once each."""
         cells = self.cells[:, None, :] + NEIGHBOURHOOD
         direction = np.repeat(self.direction, len(NEIGHBOURHOOD))
-        links = Links(direction, cells.reshape(-1, 2))
-        return Links.of(np.unique(links.keys()))
+        links = CellLinks(direction, cells.reshape(-1, 2))
+        return CellLinks.of(np.unique(links.keys()))
 
     @classmethod
-    def of(cls, keys: Indices) -> Links:
+    def of(cls, keys: Indices) -> CellLinks:
         """The links with these numbers."""
         cell_keys, direction = np.divmod(keys, _DIRECTIONS)
         return cls(direction, _cells(cell_keys))
@@ -143,7 +141,7 @@ def move_places(graph: Graph, old: Floats, new: Floats) -> list[Operation]:
 
 
 def _move_shares(graph: Graph, column: PlaceColumn, movement: Movement) -> Iterator[Operation]:
-    """Where several cells move to one, it has the largest of their shares."""
+    """Move the shares of cells; if several move to one, it has the largest."""
     cells, shares = graph.places.written_cells(ROOT_MAP, column)
     if not len(cells):
         return
@@ -161,69 +159,52 @@ def _move_shares(graph: Graph, column: PlaceColumn, movement: Movement) -> Itera
     np.maximum.at(after, merged.arrived, shares)
 
     is_changed = after != known.values_at(merged.keys)
-    yield from _written(column, _cells(merged.keys[is_changed]), after[is_changed])
+    yield from written_cells(column, _cells(merged.keys[is_changed]), after[is_changed])
 
 
 def _move_links(graph: Graph, movement: Movement) -> Iterator[Operation]:
-    """Where several links move to one, it is cut if one of them is."""
-    links, evidence = _links(graph)
+    """Move the evidence of links; if several move to one, it is cut if one of them is."""
+    directions = []
+    found = []
+    values = []
+    for direction, column in enumerate(EVIDENCE_COLUMNS):
+        cells, of_column = graph.places.written_cells(ROOT_MAP, column)
+        directions.append(np.full(len(cells), direction))
+        found.append(cells)
+        values.append(of_column)
+
+    evidence = np.concatenate(values)
     if not len(evidence):
         return
 
+    links = CellLinks(np.concatenate(directions), np.concatenate(found))
     known = Known(links.keys(), evidence)
     arrived = links.moved(movement)
     around = arrived.neighbourhood()
-    origins = around.moved(movement.back())
-    gathered = known.values_at(origins.keys())
+    gathered = known.values_at(around.moved(movement.back()).keys())
 
+    # What was gathered from around; where nothing was, the strongest that arrived for free; and
+    # everywhere what arrived for cut.
     merged = Merged.of(known, around.keys(), arrived.keys())
-    after = _merged_evidence(merged, gathered, evidence)
-    before = known.values_at(merged.keys)
-    is_changed = after != before
-    changed = Links.of(merged.keys[is_changed])
-    yield from _written_links(changed, before[is_changed], after[is_changed])
-
-
-def _merged_evidence(merged: Merged, gathered: Floats, arrived: Floats) -> Floats:
-    """(n,): the evidence that (a,) `gathered` and (k,) `arrived` give: what was gathered, where
-    nothing was the strongest that arrived for free, and everywhere what arrived for cut.
-    """
     free = np.zeros(len(merged.keys))
-    np.maximum.at(free, merged.arrived, arrived)
+    np.maximum.at(free, merged.arrived, evidence)
     after = np.zeros(len(merged.keys))
     after[merged.around] = gathered
     after = np.where(after == 0, free, after)
+    is_cut = evidence < 0
+    np.minimum.at(after, merged.arrived[is_cut], evidence[is_cut])
 
-    is_cut = arrived < 0
-    np.minimum.at(after, merged.arrived[is_cut], arrived[is_cut])
-    return after
-
-
-def _links(graph: Graph) -> tuple[Links, Floats]:
-    """The links that have evidence, and the evidence, (k,)."""
-    directions = []
-    cells = []
-    evidence = []
+    before = known.values_at(merged.keys)
+    is_changed = after != before
+    changed = CellLinks.of(merged.keys[is_changed])
+    weights = weights_of(after[is_changed].astype(np.float32))
+    has_new_weight = weights != weights_of(before[is_changed].astype(np.float32))
     for direction, column in enumerate(EVIDENCE_COLUMNS):
-        found, values = graph.places.written_cells(ROOT_MAP, column)
-        directions.append(np.full(len(found), direction))
-        cells.append(found)
-        evidence.append(values)
-
-    return Links(np.concatenate(directions), np.concatenate(cells)), np.concatenate(evidence)
-
-
-def _written_links(links: Links, before: Floats, after: Floats) -> Iterator[Operation]:
-    """New evidence of links that had (k,) `before`, and their weights as far as these change."""
-    weights = weights_of(after.astype(np.float32))
-    has_new_weight = weights != weights_of(before.astype(np.float32))
-
-    for direction in range(_DIRECTIONS):
-        is_here = links.direction == direction
-        yield from _written(EVIDENCE_COLUMNS[direction], links.cells[is_here], after[is_here])
+        is_here = changed.direction == direction
+        yield from written_cells(column, changed.cells[is_here], after[is_changed][is_here])
 
         is_new = is_here & has_new_weight
-        yield from _written(WEIGHT_COLUMNS[direction], links.cells[is_new], weights[is_new])
+        yield from written_cells(WEIGHT_COLUMNS[direction], changed.cells[is_new], weights[is_new])
 
 
 def _nearest_cells(movement: Movement, cells: Indices) -> Indices:
@@ -244,16 +225,3 @@ def _cells(keys: Indices) -> Indices:
     j = (keys + half) % _KEY_STEP - half
     i = (keys - j) // _KEY_STEP
     return np.column_stack([i, j])
-
-
-def _written(column: PlaceColumn, cells: Indices, values: npt.ArrayLike) -> Iterator[Operation]:
-    """New values of a column, at most as many at once as the workspace takes."""
-    new = np.asarray(values, np.float32)
-    for start in range(0, len(cells), MAX_CELLS):
-        some = slice(start, start + MAX_CELLS)
-        yield Cells(
-            map=ROOT_MAP,
-            column=column,
-            cells=Array.of(cells[some], "<i4"),
-            values=Array.of(new[some]),
-        )

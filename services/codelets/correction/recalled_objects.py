@@ -4,6 +4,7 @@ Pure.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable
 
@@ -42,9 +43,33 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
 
     operations: list[Operation] = []
     for number, label in enumerate(labels):
-        own = label or _free_label(recalled.labels[number], taken)
+        own = label
+        if not own:
+            look = look_of(recalled.labels[number])
+            names = (individual_label(look, each) for each in itertools.count(1))
+            own = next(name for name in names if name not in taken)
+
         taken.add(own)
-        node = _recalled_object(recalled, number, own, node_of.get(own), graph)
+        row = recalled.objects.numpy()[number].tolist()
+        here = node_of.get(own)
+        if here is None:
+            here = Object(id=object_id(own), label=own, x_m=0.0, y_m=0.0, last_seen_ns=NEVER_NS)
+
+        # It is as it was recalled, with what was learned of it in this run.
+        node = msgspec.structs.replace(
+            here,
+            base_level=1.0,
+            cycle=graph.cycle,
+            function=recalled.functions[number] or here.function,
+            x_m=row[RecalledColumn.X_M],
+            y_m=row[RecalledColumn.Y_M],
+            x_sd_m=row[RecalledColumn.X_SD_M],
+            y_sd_m=row[RecalledColumn.Y_SD_M],
+            width_m=row[RecalledColumn.WIDTH_M],
+            height_m=row[RecalledColumn.HEIGHT_M],
+            sightings=here.sightings + int(row[RecalledColumn.SIGHTINGS]),
+            offsets_m=None,
+        )
         place = nearest_place(node.x_m, node.y_m, graph.cell_m(ROOT_MAP))
         operations += [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
 
@@ -53,7 +78,7 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
 
 def _labels(recalled: Recollection, known: list[Object], pose: Floats) -> list[str]:
     """The label here of each recalled object: the one it is matched with, or that of the object of
-    its look that stands there too; empty where there is none.
+    its look that stands there too; empty if there is none.
     """
     positions_m = np.array([(node.x_m, node.y_m) for node in known]).reshape(-1, 2)
     here_m = transform_from(pose, positions_m).tolist()
@@ -90,38 +115,3 @@ def _standing_there(
             nearest_m = away_m
 
     return found
-
-
-def _free_label(label: str, taken: set[str]) -> str:
-    """The first label of a look that is not taken."""
-    number = 1
-    while individual_label(look_of(label), number) in taken:
-        number += 1
-
-    return individual_label(look_of(label), number)
-
-
-def _recalled_object(
-    recalled: Recollection, number: int, label: str, known: Object | None, graph: Graph
-) -> Object:
-    """A recalled object, with what was learned of it in this run."""
-    row = recalled.objects.numpy()[number].tolist()
-    sightings = int(row[RecalledColumn.SIGHTINGS])
-    node = known
-    if node is None:
-        node = Object(id=object_id(label), label=label, x_m=0.0, y_m=0.0, last_seen_ns=NEVER_NS)
-
-    return msgspec.structs.replace(
-        node,
-        base_level=1.0,
-        cycle=graph.cycle,
-        function=recalled.functions[number] or node.function,
-        x_m=row[RecalledColumn.X_M],
-        y_m=row[RecalledColumn.Y_M],
-        x_sd_m=row[RecalledColumn.X_SD_M],
-        y_sd_m=row[RecalledColumn.Y_SD_M],
-        width_m=row[RecalledColumn.WIDTH_M],
-        height_m=row[RecalledColumn.HEIGHT_M],
-        sightings=node.sightings + sightings,
-        offsets_m=None,
-    )

@@ -11,7 +11,7 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose
 from cogmap.graph.graph import Graph
 from cogmap.schemas.graph import DropNode, Links, Operation
-from cogmap.schemas.nodes import LinkKind, Map, Object, Recollection, SubMap, map_id
+from cogmap.schemas.nodes import LinkKind, Map, Object, Recollection, map_id
 from cogmap.services.codelets.sub_maps.members import next_number, sub_maps_of
 
 
@@ -28,9 +28,22 @@ def recalled_sub_maps(
         return []
 
     here = dict(zip(recalled.labels, objects, strict=True))
-    maps: list[Operation] = [_as_map(each, graph) for each in recalled.sub_maps]
+    maps: list[Operation] = []
     within = {}
     for each in recalled.sub_maps:
+        node = Map(
+            id=map_id(each.number),
+            base_level=1.0,
+            cycle=graph.cycle,
+            cell_m=each.cell_m,
+            parent=map_id(each.parent),
+            x_m=each.x_m,
+            y_m=each.y_m,
+            heading_rad=each.heading_rad,
+            width_m=each.width_m,
+            height_m=each.height_m,
+        )
+        maps.append(node)
         for label in each.members:
             if label in here:
                 within[here[label].id] = map_id(each.number)
@@ -42,34 +55,15 @@ def recalled_sub_maps(
             name for name in graph.links.sources(node.id, LinkKind.WITHIN) if name not in within
         ]
         if left:
-            maps.append(_moved(node, number, pose))
+            frame = compose(pose, np.array([node.x_m, node.y_m, node.heading_rad]))
+            x_m, y_m, heading_rad = frame.tolist()
+            renumbered = msgspec.structs.replace(
+                node, id=map_id(number), x_m=x_m, y_m=y_m, heading_rad=heading_rad
+            )
+            maps.append(renumbered)
             within |= dict.fromkeys(left, map_id(number))
             number += 1
 
     weights = {name: {target: 1.0} for name, target in sorted(within.items())}
     gone = [DropNode(id=node.id) for node in before]
     return [*gone, *maps, Links(kind=LinkKind.WITHIN, weights=weights)]
-
-
-def _as_map(sub_map: SubMap, graph: Graph) -> Map:
-    return Map(
-        id=map_id(sub_map.number),
-        base_level=1.0,
-        cycle=graph.cycle,
-        cell_m=sub_map.cell_m,
-        parent=map_id(sub_map.parent),
-        x_m=sub_map.x_m,
-        y_m=sub_map.y_m,
-        heading_rad=sub_map.heading_rad,
-        width_m=sub_map.width_m,
-        height_m=sub_map.height_m,
-    )
-
-
-def _moved(node: Map, number: int, pose: Floats) -> Map:
-    """A sub-map of this run under another number, in the recalled map's frame."""
-    frame = compose(pose, np.array([node.x_m, node.y_m, node.heading_rad]))
-    x_m, y_m, heading_rad = frame.tolist()
-    return msgspec.structs.replace(
-        node, id=map_id(number), x_m=x_m, y_m=y_m, heading_rad=heading_rad
-    )

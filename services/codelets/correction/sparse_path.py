@@ -1,8 +1,8 @@
 """The sparse-path codelet: places of the path where older ones stood already are joined into those
 (beyond the paper).
 
-Path and closures, and with them what a correction costs, are then bounded by the town, not by the
-time that the agent has driven. The first pass of each place stays as it is.
+The path and its closures, and with them the cost of a correction, then grow with the town, not with
+driving time. The first pass of each place stays as it is.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
@@ -28,14 +28,14 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.correction.joining import Joining, joining, joins, left, visited
-from cogmap.services.codelets.correction.remains import closures_left, observations_left
+from cogmap.services.codelets.correction.reattribution import closures_left, observations_left
 from cogmap.services.codelets.mapping.path import JOINED, STAMP, with_rows
 from cogmap.services.codelets.mapping.views import views_of
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task about the oldest segment of the path that is not sparse yet, once it is old enough
-    that no correction that was mistaken is taken back any more; none while the path is to be moved.
+    """Return one task about the oldest segment of the path that is not sparse yet, once it is so
+    old that no mistaken correction of it is undone any more; none while the path is to be moved.
     """
     if CORRECTION_ID in graph.nodes or RECOLLECTION_ID in graph.nodes:
         return []
@@ -61,9 +61,17 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     segment = path[number]
     joined = joining(rows_of(known), segment.rows.numpy(), config)
 
+    lengths = [len(each.rows.numpy()) for each in known]
+    numbers = np.repeat(np.array([each.number for each in known], np.int64), lengths)
     operations = _path_left(path, number, joined, config)
-    operations += observations_left(graph, segment.id, joined, _numbers(known))
-    operations += _closures_left(graph, path, joined)
+    operations += observations_left(graph, segment.id, joined, numbers)
+
+    closures = list(graph.of_kind(LoopClosure))
+    if closures:
+        first = len(joined.known)
+        ends = views_of(closures, rows_of(path))
+        counted = ends._replace(i=ends.i - first, j=ends.j - first)
+        operations += closures_left(closures, counted, joined)
     return Answer(operations)
 
 
@@ -89,7 +97,15 @@ def _path_left(
     rows, count_after = left(joined)
     led = joins(joined.preceded(rows_of(before)[-1:]), config)
 
-    after = _visited(before, joined)
+    # Each known place has the time when the agent was there last.
+    times = visited(joined)
+    after = []
+    start = 0
+    for segment in before:
+        end = start + len(segment.rows.numpy())
+        after.append(with_rows(segment, times[start:end]))
+        start = end
+
     if len(rows):
         kept = msgspec.structs.replace(path[number], rows=Matrix.of(rows), is_sparse=True)
         after.append(_with_joins(kept, led))
@@ -114,34 +130,3 @@ def _with_joins(segment: PathSegment, rows: Floats) -> PathSegment:
     if segment.joins is not None:
         rows = np.vstack([segment.joins.numpy(), rows])
     return msgspec.structs.replace(segment, joins=Matrix.of(rows))
-
-
-def _visited(known: list[PathSegment], joined: Joining) -> list[PathSegment]:
-    """The known segments, with the time when the agent was at each place last."""
-    after = visited(joined)
-    segments = []
-    start = 0
-    for segment in known:
-        end = start + len(segment.rows.numpy())
-        segments.append(with_rows(segment, after[start:end]))
-        start = end
-
-    return segments
-
-
-def _numbers(path: list[PathSegment]) -> Indices:
-    """(k,): the segment of each place."""
-    numbers = [segment.number for segment in path]
-    lengths = [len(segment.rows.numpy()) for segment in path]
-    return np.repeat(np.array(numbers, np.int64), lengths)
-
-
-def _closures_left(graph: Graph, path: list[PathSegment], joined: Joining) -> list[Operation]:
-    closures = list(graph.of_kind(LoopClosure))
-    if not closures:
-        return []
-
-    first = len(joined.known)
-    ends = views_of(closures, rows_of(path))
-    counted = ends._replace(i=ends.i - first, j=ends.j - first)
-    return closures_left(closures, counted, joined)

@@ -17,7 +17,7 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import NEVER_NS, Object, PathColumn, PathSegment, object_id
-from cogmap.services.codelets.localization.measurement_model import Sighting
+from cogmap.services.codelets.localization.measurement_model import Measurements
 from cogmap.services.codelets.localization.sampling import centred
 
 VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
@@ -25,7 +25,7 @@ STAMP_FORMAT = struct.Struct("<d")
 STAMP_OFFSET = PathColumn.STAMP_S * STAMP_FORMAT.size
 
 
-def new_share(samples: Floats, seen: Sighting, since: Floats) -> Floats:
+def new_share(samples: Floats, seen: Measurements, since: Floats) -> Floats:
     """(k,): the share, 0 to 1, of the uncertainty of (n, 7) samples' position that came since each
     landmark was placed: `since` (k, 2), by path integration's variances in m^2 and rad^2.
     """
@@ -39,7 +39,7 @@ def new_share(samples: Floats, seen: Sighting, since: Floats) -> Floats:
     return share.clip(0.0, 1.0)
 
 
-def variances_when_placed(graph: Graph, seen: Sighting) -> Floats:
+def variances_when_placed(graph: Graph, seen: Measurements) -> Floats:
     """(k, 2): path integration's variances at which each landmark in view was placed."""
     path = graph.path
     variances = []

@@ -51,7 +51,7 @@ CONFIRMED_BASE_LEVEL = 0.15
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task for all objects in view that the map has."""
+    """Return one task for all objects in view that the map has."""
     by_label = sorted(context.percepts.objects, key=lambda percept: percept.label)
     known = [percept for percept in by_label if object_id(percept.label) in graph.nodes]
     if not known:

@@ -42,10 +42,10 @@ from cogmap.services.codelets.localization.information import (
 )
 from cogmap.services.codelets.localization.measurement_model import (
     GATE,
-    Sighting,
+    Measurements,
     compare,
     log_likelihood,
-    sightings,
+    measurements,
 )
 from cogmap.services.codelets.localization.misfits import (
     Estimate,
@@ -74,7 +74,7 @@ FORGOTTEN_NS = 20_000_000_000
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task in each cycle."""
+    """Return one task in each cycle."""
     percepts = context.percepts.objects
     seen = [object_id(label) for label in sorted(percept.label for percept in percepts)]
     about = [SELF_ID, *(name for name in seen if name in graph.nodes)]
@@ -112,12 +112,14 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         before_it = agent.misfits
         found = Estimate(moved, 1.0, before_it.count, before_it.label, before_it.is_lost)
 
-    seen = sightings(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
+    seen = measurements(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
     if seen is not None:
         since = variances - variances_when_placed(graph, seen)
         weights = new_share(moved, seen, since) / config.correlated_views
         found = correct(found, seen, weights, config, rng)
-        found = inflated(found, _path_sd_m(agent.odometry, variances), rng)
+        away_m2 = agent.odometry.x_m**2 + agent.odometry.y_m**2
+        path_m2 = float(variances[0]) + float(variances[1]) * away_m2
+        found = inflated(found, math.sqrt(path_m2), rng)
 
     gains = found.samples[:, POSE_COLUMNS:].mean(axis=0)
     odometry = dead_reckon(agent.odometry.pose(), motions, gains)
@@ -160,7 +162,7 @@ CODELET = Codelet(
 
 
 def correct(
-    past: Estimate, seen: Sighting, weights: Floats, config: Config, rng: np.random.Generator
+    past: Estimate, seen: Measurements, weights: Floats, config: Config, rng: np.random.Generator
 ) -> Estimate:
     """Reject samples by what is in view, each landmark by its weight (k,).
 
@@ -202,22 +204,13 @@ def correct(
 
 
 def _is_heading_unknown(headings_rad: Floats) -> bool:
-    """If the headings (n,) are so far apart that nearly any may be the agent's."""
+    """Return whether the headings (n,) are so far apart that nearly any may be the agent's."""
     if np.ptp(headings_rad) <= TURNED_RAD:
         return False
 
     mean_x = np.cos(headings_rad).mean()
     mean_y = np.sin(headings_rad).mean()
     return bool(np.hypot(mean_x, mean_y) < ALIKE)
-
-
-def _path_sd_m(odometry: PathIntegration, variances: Floats) -> float:
-    """The standard deviation of the position by path integration alone, by its `variances` since
-    the start, in m^2 and rad^2.
-    """
-    variance_m2, variance_rad2 = variances.tolist()
-    away_m2 = odometry.x_m**2 + odometry.y_m**2
-    return math.sqrt(variance_m2 + variance_rad2 * away_m2)
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:

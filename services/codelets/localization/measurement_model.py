@@ -34,12 +34,12 @@ FULL_TURN_RAD = np.float32(2 * np.pi)
 MAX_MAHALANOBIS2 = np.float32(150.0)
 
 
-class Sighting(NamedTuple):
+class Measurements(NamedTuple):
     """k known landmarks in view: where each is believed to be and where it is seen.
 
     `mean_m` (k, 2) and `covariance_m2` (k, 2, 2) are of the landmark on the map; the rest, (k,)
     each, of the percept; `evidence` is how likely its name is, by the view alone. A bearing is
-    unknown where its standard deviation is at least a half turn, a range where it is at least the
+    unknown if its standard deviation is at least a half turn, a range if it is at least the
     range.
     """
 
@@ -83,7 +83,7 @@ class Comparison(NamedTuple):
     density: Singles
 
 
-def compare(samples: Floats, seen: Sighting) -> Comparison:
+def compare(samples: Floats, seen: Measurements) -> Comparison:
     """Compare (n, 7) samples of the self with what is seen.
 
     The uncertainty of a landmark's own position is carried to its range and bearing once, at the
@@ -108,7 +108,9 @@ def compare(samples: Floats, seen: Sighting) -> Comparison:
     return Comparison(squared, density)
 
 
-def _squared(samples: Floats, seen: Sighting, bearing_var: Floats, range_var: Floats) -> Singles:
+def _squared(
+    samples: Floats, seen: Measurements, bearing_var: Floats, range_var: Floats
+) -> Singles:
     """(k, n): squared Mahalanobis distances, computed in place, for they take most of an update."""
     east_m = _single(seen.mean_m[:, 0, None] - samples[:, 0])
     north_m = _single(seen.mean_m[:, 1, None] - samples[:, 1])
@@ -153,9 +155,9 @@ def cost_of_mistake() -> float:
     return -math.log(OUTLIER_SHARE)
 
 
-def sightings(
+def measurements(
     percepts: Iterable[Percept], graph: Graph, largest_sd_m: float, stationary_since_ns: int
-) -> Sighting | None:
+) -> Measurements | None:
     """The percepts whose object on the map is known well enough to inform; None without any.
 
     Well enough is to `largest_sd_m`, and to half of its distance: samples on a ring around the
@@ -189,7 +191,7 @@ def sightings(
     if not chosen:
         return None
 
-    return Sighting(
+    return Measurements(
         labels=tuple(percept.label for percept in chosen),
         mean_m=np.array(means_m),
         covariance_m2=np.array(covariances_m2),
@@ -202,8 +204,8 @@ def sightings(
 
 
 def is_seen_from_here(node: Object, stationary_since_ns: int) -> bool:
-    """If an agent that stands since `stationary_since_ns` has seen the landmark from where it
-    stands.
+    """Return whether an agent that stands since `stationary_since_ns` has seen the landmark from
+    where it stands.
     """
     is_stationary = stationary_since_ns != NEVER_NS
     return is_stationary and node.last_seen_ns >= stationary_since_ns

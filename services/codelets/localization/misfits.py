@@ -1,7 +1,7 @@
 """Decides what follows from landmarks that do not fit: the agent is elsewhere, or they are.
 
 One landmark that does not fit may be mistaken for another. The agent is lost if several do not fit;
-if a single one does not, the agent is elsewhere only where all that was seen in the last seconds
+if a single one does not, the agent is elsewhere only if all that was seen in the last seconds
 fits another pose.
 """
 
@@ -18,11 +18,11 @@ from cogmap.schemas.nodes import NEVER_NS, Self
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.localization.measurement_model import (
-    Sighting,
+    Measurements,
     compare,
     cost_of_mistake,
     log_likelihood,
-    sightings,
+    measurements,
 )
 from cogmap.services.codelets.localization.recovery import (
     MIN_FITTING,
@@ -64,7 +64,7 @@ class Estimate:
     is_not_elsewhere: bool = False
 
 
-def misfit(past: Estimate, seen: Sighting) -> Estimate:
+def misfit(past: Estimate, seen: Measurements) -> Estimate:
     """The estimate after a view in which nothing fits. If several landmarks do not, the agent is
     elsewhere; one that does not for long stands elsewhere, or is another.
     """
@@ -89,9 +89,9 @@ def inflated(found: Estimate, limit_m: float, rng: np.random.Generator) -> Estim
 def recent_percepts(
     found: Estimate, task: Task, agent: Self, graph: Graph, odometry: Floats
 ) -> list[Percept]:
-    """What is evidence of where the agent is, in the view of `task` and before, while something
-    does not fit: everything since a landmark fitted, if the agent is lost, else that of the last
-    seconds.
+    """Return what is evidence of where the agent is, in the view of `task` and before, while
+    something does not fit: everything since a landmark fitted, if the agent is lost, else that of
+    the last seconds.
 
     Path integration alone has the agent at `odometry` (3,).
     """
@@ -112,8 +112,8 @@ def relocalized(
     config: Config,
     rng: np.random.Generator,
 ) -> Estimate:
-    """Where the agent is by all `percepts`, after a view in which something does not fit."""
-    seen = sightings(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
+    """Return where the agent is by all `percepts`, after a view in which something does not fit."""
+    seen = measurements(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
     if seen is None:
         return found
     if found.is_lost:
@@ -121,7 +121,7 @@ def relocalized(
     return _reconsidered(found, seen, rng)
 
 
-def _where_most_fits(lost: Estimate, seen: Sighting, rng: np.random.Generator) -> Estimate:
+def _where_most_fits(lost: Estimate, seen: Measurements, rng: np.random.Generator) -> Estimate:
     """Relocalize by all that is `seen`, once several landmarks have not fitted for long.
 
     The agent is where most of them fit one pose, together, all the sooner the more do; else, after
@@ -146,7 +146,7 @@ def _where_most_fits(lost: Estimate, seen: Sighting, rng: np.random.Generator) -
     return lost
 
 
-def _reconsidered(doubtful: Estimate, seen: Sighting, rng: np.random.Generator) -> Estimate:
+def _reconsidered(doubtful: Estimate, seen: Measurements, rng: np.random.Generator) -> Estimate:
     """The pose that explains all that is `seen` so much better that more than one landmark would
     have to be mistaken for the agent to be where it is believed.
 
@@ -168,7 +168,7 @@ def _reconsidered(doubtful: Estimate, seen: Sighting, rng: np.random.Generator) 
     return Estimate(found, 0.0, was_kidnapped=True)
 
 
-def _best_log_likelihood(samples: Floats, seen: Sighting) -> float:
+def _best_log_likelihood(samples: Floats, seen: Measurements) -> float:
     """The logarithm of the likelihood of what is seen at the one of (n, 7) samples which explains
     it best, at most 0.
     """

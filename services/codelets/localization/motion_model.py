@@ -1,10 +1,10 @@
 """The motion model: samples of the self moved by path integration (paper §5.4), with the lasting
 errors of the senses as part of the state.
 
-Beyond the paper, whose noise is drawn anew at every step: a wheel that slips goes on slipping, and
-stereo that sees too near goes on doing so. Each sample of the self holds gains for that, and those
-that agree with the landmarks are kept, as place cells recalibrate path integration by landmarks
-(Jayakumar et al. 2019, doi 10.1038/s41586-019-0939-3).
+Beyond the paper, whose noise is drawn anew at every step: a wheel slips for some seconds, stereo
+sees too near for minutes. Each sample of the self holds gains for that, and those that agree with
+the landmarks are kept, as place cells recalibrate path integration by landmarks (Jayakumar et al.
+2019, doi 10.1038/s41586-019-0939-3).
 """
 
 from __future__ import annotations

@@ -24,7 +24,7 @@ from cogmap.services.codelets.localization.sampling import generator, resample
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task for each object in view that the map lacks."""
+    """Return one task for each object in view that the map lacks."""
     by_label = sorted(context.percepts.objects, key=lambda percept: percept.label)
 
     return [

@@ -16,7 +16,7 @@ from cogmap.services.codelets.localization.measurement_model import (
     FARTHEST_M,
     GATE,
     MAX_SD_SHARE,
-    Sighting,
+    Measurements,
     compare,
     log_likelihood,
 )
@@ -26,7 +26,7 @@ from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import ODOMETRY, STAMP, objects_along
 
 CANDIDATES = 16
-# A pose is believed that so many landmarks fit, and such a share of those in view.
+# A pose is accepted that so many landmarks fit, and such a share of those in view.
 MIN_FITTING = 2
 FITTING_SHARE = 2 / 3
 SURE_M = 1.0
@@ -87,7 +87,7 @@ def seen_before(graph: Graph, odometry: Floats, since_ns: float) -> list[Percept
     return percepts
 
 
-def relocalize(gains: Floats, seen: Sighting, rng: np.random.Generator) -> Floats:
+def relocalize(gains: Floats, seen: Measurements, rng: np.random.Generator) -> Floats:
     """(n, 7) samples of the self by what is in view alone; the senses' gains are those of (n, 7)
     `gains`.
 
@@ -124,7 +124,9 @@ def relocalize(gains: Floats, seen: Sighting, rng: np.random.Generator) -> Float
     return _drawn(candidates, density, len(gains), rng)
 
 
-def best_of(samples: Floats, seen: Sighting, is_unsure: bool, min_fitting: int) -> Floats | None:
+def best_of(
+    samples: Floats, seen: Measurements, is_unsure: bool, min_fitting: int
+) -> Floats | None:
     """Those of relocalization's (n, 7) samples at which the agent is taken to be; None if it is at
     none.
 
@@ -152,7 +154,7 @@ def best_of(samples: Floats, seen: Sighting, is_unsure: bool, min_fitting: int) 
     return there if position_sd_m(there) <= limit_m else None
 
 
-def relocalize_heading(samples: Floats, seen: Sighting, rng: np.random.Generator) -> Floats:
+def relocalize_heading(samples: Floats, seen: Measurements, rng: np.random.Generator) -> Floats:
     """(n, 7) samples of the self, its position known, its heading unknown: turned by what is in
     view.
 

@@ -67,7 +67,7 @@ def position_sd_m(samples: Samples) -> float:
 def rejection_mask(log_likelihood: Samples, rng: np.random.Generator) -> Booleans:
     """(n,): which samples rejection keeps, each with a probability proportional to its likelihood.
 
-    The likeliest is always kept, so that one is even where all are unlikely.
+    The likeliest is always kept, so that one is, even if all are unlikely.
     """
     probability = np.exp(log_likelihood - log_likelihood.max())
     kept: Booleans = rng.random(len(probability)) < probability
@@ -131,11 +131,12 @@ def tempering_exponent(log_likelihood: Samples, share: float) -> float:
 def rejection_resample(
     samples: Samples, log_likelihood: Samples, min_kept: int, rng: np.random.Generator
 ) -> tuple[Samples, float]:
-    """What rejection keeps of (n, d) samples, smoothed by a kernel, and the share that it is.
+    """Return what rejection keeps of (n, d) samples, smoothed by a kernel, and the share that it
+    is.
 
     Each is kept with a probability proportional to its likelihood, and of those alike in the last
     column as many as expected: independent draws would let the mean of what the likelihood does not
-    inform drift, view by view. Where fewer than `min_kept` would be kept, that many are drawn with
+    inform drift, view by view. If fewer than `min_kept` would be kept, that many are drawn with
     the same probabilities, some repeatedly.
     """
     order = np.argsort(samples[:, -1], kind="stable")

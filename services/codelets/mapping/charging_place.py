@@ -24,14 +24,14 @@ from cogmap.schemas.nodes import (
 )
 
 LOOK = "charging-place"
-# As near to it the agent is charged as well by the one that it knows.
+# From as near, the one that is known charges as well.
 SAME_M = 8.0
 SD_M = 2.0
 MAX_PLACES = 64
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task where a need is eased, and nothing is known nearby that eases it."""
+    """Return one task if a need is eased, and nothing is known nearby that eases it."""
     agent = graph.agent
     if agent is None or agent.misfits.is_lost or not _unexplained(agent, graph):
         return []
@@ -48,7 +48,8 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
 
     answer = Answer()
     for function in _unexplained(agent, graph):
-        label = _unused_label(graph)
+        labels = (individual_label(LOOK, number) for number in range(1, MAX_PLACES + 1))
+        label = next((each for each in labels if object_id(each) not in graph.nodes), "")
         if not label:
             continue
 
@@ -85,30 +86,12 @@ CODELET = Codelet(
 
 
 def _unexplained(agent: Self, graph: Graph) -> list[str]:
-    """The functions that ease a need now, where no object nearby has them."""
-    functions = []
-    for need in graph.of_kind(Need):
-        function = SATISFIED_BY.get(need.label, "")
-        if need.is_eased and function and not _is_known(function, agent, graph):
-            functions.append(function)
-
-    return functions
-
-
-def _is_known(function: str, agent: Self, graph: Graph) -> bool:
+    """The functions that ease a need now, if no object nearby has them."""
+    here_m = (agent.x_m, agent.y_m)
+    near = set()
     for node in graph.of_kind(Object):
-        is_here = node.function == function and node.map == agent.map
-        if is_here and math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m)) <= SAME_M:
-            return True
+        if node.map == agent.map and math.dist((node.x_m, node.y_m), here_m) <= SAME_M:
+            near.add(node.function)
 
-    return False
-
-
-def _unused_label(graph: Graph) -> str:
-    """The label of an individual that the map lacks; empty where it has MAX_PLACES of them."""
-    for number in range(1, MAX_PLACES + 1):
-        label = individual_label(LOOK, number)
-        if object_id(label) not in graph.nodes:
-            return label
-
-    return ""
+    eased = [SATISFIED_BY.get(need.label, "") for need in graph.of_kind(Need) if need.is_eased]
+    return [function for function in eased if function and function not in near]

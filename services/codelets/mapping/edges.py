@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.geometry.arrays import Floats, Indices
-from cogmap.graph.crossings import Crossings, crossings
+from cogmap.geometry.arrays import Floats
+from cogmap.graph.crossings import crossings
 from cogmap.graph.window import LINK_OFFSETS
 from cogmap.services.codelets.mapping.local_grid import LocalGrid
 from cogmap.services.codelets.mapping.rays import Rays, walls
@@ -27,14 +27,16 @@ class Edges(NamedTuple):
 
 
 def edges_of(boundary_m: Floats, rays: Rays, grid: LocalGrid) -> Edges:
-    """Where the road ends, by (n, 2) points in the robot's frame, and what rays hit.
+    """Return where the road ends, by (n, 2) points in the robot's frame, and what rays hit.
 
     Each two points within reach that are at most JOIN_M apart are joined; a point alone is taken
     for a mistake.
     """
     range_m = np.hypot(boundary_m[:, 0], boundary_m[:, 1])
     near_m = boundary_m[range_m <= grid.reach_m]
-    one, other = _pairs(near_m)
+    apart_m = near_m[:, None] - near_m
+    is_near = (apart_m**2).sum(axis=2) <= JOIN_M**2
+    one, other = np.nonzero(np.triu(is_near, k=1))
 
     kerb = grid.positions(near_m)
     wall_starts, wall_ends = walls(rays, grid.cell_m)
@@ -50,35 +52,13 @@ def cut_links(edges: Edges, grid: LocalGrid) -> Floats:
     range_m = np.hypot(away[:, 0], away[:, 1]) * grid.cell_m
     certainty = grid.certainty(range_m)
 
-    crossed = _within(crossings(edges.starts, edges.ends), grid)
-    links = (crossed.direction, crossed.i, crossed.j)
-    cut = np.zeros((len(LINK_OFFSETS), *grid.extent.shape))
-    np.maximum.at(cut, links, certainty[crossed.segment])
-    return cut
-
-
-def _pairs(points_m: Floats) -> tuple[Indices, Indices]:
-    """The numbers of each two of (n, 2) points that are near each other, (k,) each."""
-    apart_m = points_m[:, None] - points_m
-    squared_m2 = (apart_m**2).sum(axis=2)
-    is_near = squared_m2 <= JOIN_M**2
-
-    one, other = np.nonzero(np.triu(is_near, k=1))
-    return one, other
-
-
-def _within(crossed: Crossings, grid: LocalGrid) -> Crossings:
-    """The links of a grid's cells, by the index of the cell in the grid."""
+    crossed = crossings(edges.starts, edges.ends)
     width, height = grid.extent.shape
     i = crossed.i - grid.extent.lower[0]
     j = crossed.j - grid.extent.lower[1]
+    is_inside = (i >= 0) & (i < width) & (j >= 0) & (j < height)
 
-    is_inside_i = (i >= 0) & (i < width)
-    is_inside_j = (j >= 0) & (j < height)
-    is_inside = is_inside_i & is_inside_j
-    return Crossings(
-        crossed.direction[is_inside],
-        i[is_inside],
-        j[is_inside],
-        crossed.segment[is_inside],
-    )
+    links = (crossed.direction[is_inside], i[is_inside], j[is_inside])
+    cut = np.zeros((len(LINK_OFFSETS), width, height))
+    np.maximum.at(cut, links, certainty[crossed.segment[is_inside]])
+    return cut

@@ -23,7 +23,7 @@ def accumulated(evidence: Singles, cut: Floats, free: Floats) -> Singles:
     """The evidence of links after a view in which they appeared `cut`, or otherwise `free`, each 0
     to 1, by how sure that was; above 0 it is for free, below 0 for cut.
 
-    It saturates, so that what changes is believed after a few views, however long it was otherwise.
+    It saturates, so that what changes counts after a few views, however long it was otherwise.
     """
     change = np.where(cut > 0, -CUT_GAIN * cut, FREE_GAIN * free)
     after = (evidence + change).clip(-MAX_CUT, MAX_FREE)
@@ -31,7 +31,7 @@ def accumulated(evidence: Singles, cut: Floats, free: Floats) -> Singles:
 
 
 def weights_of(evidence: Singles) -> Singles:
-    """The weights of links by their evidence: 1 where it is not below 0, and 0 where they are cut.
+    """The weights of links by their evidence: 1 if it is not below 0, and 0 if they are cut.
 
     It takes more than one sighting to cut a link.
     """
@@ -40,8 +40,8 @@ def weights_of(evidence: Singles) -> Singles:
 
 
 def blended(shares: Singles, seen: Floats, certainty: Floats) -> Singles:
-    """The shares of cells, 0 to 1, after a view in which they appeared as `seen`, believed by
-    `certainty`, 0 where they were not in view: a running mean over the last few views.
+    """The shares of cells, 0 to 1, after a view in which they appeared as `seen`, weighed by
+    `certainty`, 0 if they were not in view: a running mean over the last few views.
     """
     after = shares + CELL_GAIN * certainty * (seen - shares)
     after[(after < FORGOTTEN_BELOW) & (seen == 0)] = 0.0
@@ -49,6 +49,6 @@ def blended(shares: Singles, seen: Floats, certainty: Floats) -> Singles:
 
 
 def _if_changed(before: Singles, after: Floats) -> Singles:
-    """`after` where it differs enough from `before`, which stays elsewhere."""
+    """`after` if it differs enough from `before`, which stays elsewhere."""
     is_changed = np.abs(after - before) > MIN_CHANGE
     return np.where(is_changed, after, before).astype(np.float32)

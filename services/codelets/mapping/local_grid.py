@@ -73,11 +73,11 @@ class LocalGrid:
         return range_m
 
     def certainty(self, range_m: Floats) -> Floats:
-        """How much something seen at these ranges is worth, 0 to 1: half where the standard
+        """Return how much something seen at these ranges is worth, 0 to 1: half where the standard
         deviation of its position is half a cell.
 
-        The agent's own uncertainty counts for half a cell at most: while it explores, the map is
-        as uncertain as the agent is, and what it sees lies right beside what it saw before.
+        The agent's own uncertainty counts for half a cell at most: while it explores, the map is as
+        uncertain as the agent is, and what it sees lies right beside what it saw before.
         """
         half_m = self.cell_m / 2
         pose_sd_m = min(self.pose_sd_m, half_m)

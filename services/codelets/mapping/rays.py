@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import rotate
 from cogmap.schemas.array import Array
 from cogmap.services.codelets.mapping.local_grid import RANGE_SD_SHARE, LocalGrid
@@ -46,13 +46,14 @@ class Rays:
 
 
 def rays_of(scan: Array | None, road_m: Floats, grid: LocalGrid) -> Rays:
-    """The rays of a task's scan on `grid`; none where there is no scan. Those that hit something
+    """The rays of a task's scan on `grid`; none without a scan. Those that hit something
     before road that is seen, `road_m` (n, 2), are left out: nothing stands there.
 
     A ray is clear up to half a cell, and twice the standard deviation, before what it hits. One
     that saw nothing at all, which may be the fault of the sensor, is clear for half the reach.
     """
     rays = np.zeros((0, 2)) if scan is None else np.asarray(scan.numpy(), np.float64)
+    angle_rad = float(np.median(np.abs(np.diff(rays[:, 0])))) if len(rays) > 1 else 0.0
     bearing_rad, range_m = _before_road(rays, road_m).T
     has_seen = range_m > 0
 
@@ -66,31 +67,23 @@ def rays_of(scan: Array | None, road_m: Floats, grid: LocalGrid) -> Rays:
         length=range_m / grid.cell_m,
         is_hit=has_seen & (range_m <= grid.reach_m),
         clear=clear_m.clip(0.0, min(grid.reach_m, CLEAR_M)) / grid.cell_m,
-        angle_rad=_angle_between(rays[:, 0]),
+        angle_rad=angle_rad,
     )
-
-
-def _angle_between(bearing_rad: Floats) -> float:
-    """The angle between successive rays; 0 of fewer than two."""
-    if len(bearing_rad) < 2:
-        return 0.0
-
-    between_rad = np.abs(np.diff(bearing_rad))
-    return float(np.median(between_rad))
 
 
 def _before_road(rays: Floats, road_m: Floats) -> Floats:
     """(k, 2): the rays, bearing and range each, beyond whose hit no road is seen in their sector.
 
-    Of two senses that contradict each other the eye for the road is the better one: where stereo
-    finds an obstacle by a wrong match, the road goes on behind it.
+    Of two senses that contradict each other, that for the road is the better one: behind an
+    obstacle that stereo finds by a wrong match, the road continues.
     """
     if not len(rays):
         return rays
 
     order = np.argsort(rays[:, 0])
     bearing_rad, range_m = rays[order].T
-    sector = _sectors(bearing_rad, road_m)
+    borders_rad = (bearing_rad[1:] + bearing_rad[:-1]) / 2
+    sector = borders_rad.searchsorted(np.arctan2(road_m[:, 1], road_m[:, 0]))
     beyond_m = np.hypot(road_m[:, 0], road_m[:, 1]) - range_m[sector]
 
     number_beyond = np.bincount(sector[beyond_m > BEYOND_M], minlength=len(rays))
@@ -98,13 +91,6 @@ def _before_road(rays: Floats, road_m: Floats) -> Floats:
     is_kept = np.ones(len(rays), bool)
     is_kept[order] = saw_nothing | (number_beyond < MIN_BEYOND)
     return rays[is_kept]
-
-
-def _sectors(bearing_rad: Floats, points_m: Floats) -> Indices:
-    """(n,): the ray nearest in direction to each of (n, 2) points, of ascending bearings."""
-    borders_rad = (bearing_rad[1:] + bearing_rad[:-1]) / 2
-    direction_rad = np.arctan2(points_m[:, 1], points_m[:, 0])
-    return np.searchsorted(borders_rad, direction_rad)
 
 
 def clear_cells(rays: Rays, grid: LocalGrid) -> Booleans:
@@ -119,37 +105,22 @@ def clear_cells(rays: Rays, grid: LocalGrid) -> Booleans:
 
 
 def walls(rays: Rays, cell_m: float) -> tuple[Floats, Floats]:
-    """What was hit, as straight segments from (k, 2) to (k, 2).
+    """Return what was hit, as straight segments from (k, 2) to (k, 2).
 
     Each hit stands across its ray, as wide as the ray is there; hits of successive rays that are
     near each other are joined, for a wall that runs away from the agent.
     """
     hits = rays.hits()
-    aside = _half_widths(rays, cell_m)
-    is_joined = _are_joined(hits, rays, cell_m)
+    number = np.flatnonzero(rays.is_hit)
+    length = rays.length[number]
+    across = rotate(rays.directions[number], np.pi / 2)
+    width = np.maximum(rays.angle_rad * length, MIN_WIDTH_M / cell_m)
+    aside = width[:, None] / 2 * across
+
+    are_successive = np.diff(number) == 1
+    gap = np.hypot(*np.diff(hits, axis=0).T)
+    is_joined = are_successive & (gap <= MAX_GAP_M / cell_m + MAX_GAP_SHARE * length[1:])
 
     starts = np.concatenate([hits - aside, hits[:-1][is_joined]])
     ends = np.concatenate([hits + aside, hits[1:][is_joined]])
     return starts, ends
-
-
-def _half_widths(rays: Rays, cell_m: float) -> Floats:
-    """(k, 2): from the middle of each hit to its left end."""
-    length = rays.length[rays.is_hit]
-    across = rotate(rays.directions[rays.is_hit], np.pi / 2)
-    width = np.maximum(rays.angle_rad * length, MIN_WIDTH_M / cell_m)
-
-    half: Floats = width[:, None] / 2 * across
-    return half
-
-
-def _are_joined(hits: Floats, rays: Rays, cell_m: float) -> Booleans:
-    """(k - 1,): whether each of (k, 2) hits is near that of the next ray."""
-    number = np.flatnonzero(rays.is_hit)
-    are_successive = np.diff(number) == 1
-
-    gap = np.hypot(*np.diff(hits, axis=0).T)
-    length = rays.length[number[1:]]
-    largest_gap = MAX_GAP_M / cell_m + MAX_GAP_SHARE * length
-    are_joined: Booleans = are_successive & (gap <= largest_gap)
-    return are_joined

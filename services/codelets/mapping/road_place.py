@@ -2,7 +2,7 @@
 (paper §5.2).
 
 How much a place node is road follows from the last few views of it. What was taken for road is
-withdrawn where later views show other ground there.
+withdrawn if later views show other ground there.
 """
 
 from __future__ import annotations
@@ -10,12 +10,11 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
-from cogmap.schemas.graph import Cells, Operation, Phase
+from cogmap.schemas.graph import Cells, Phase
 from cogmap.schemas.nodes import SELF_ID, PlaceColumn, Self
 from cogmap.services.codelets.mapping.evidence import blended
 from cogmap.services.codelets.mapping.local_grid import LocalGrid
@@ -28,7 +27,7 @@ NOT_ROAD_M = (3.0, 8.0)
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task in each cycle."""
+    """Return one task in each cycle."""
     task = context.task(CODELET.name, about=[SELF_ID], with_road=True, with_scan=True)
     return [task]
 
@@ -40,13 +39,32 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
         raise MessageError(f"task {task.task_id}: no self node, or no road points")
 
     grid = LocalGrid.around(agent, graph.cell_m(agent.map), ROAD_REACH_M)
-    operations: list[Operation] = [_activated(grid, task.cycle)]
-    if not agent.misfits.is_lost and task.road_m.shape[0]:
-        window = graph.places.window(agent.map, [PlaceColumn.ROAD], grid.extent)
-        after = _road(task.road_m, task.scan, grid, window.values)
-        operations += grid.changed(window.columns, window.values, after)
+    here = np.rint(grid.eye).astype(np.int32)
+    activated = Cells(
+        map=grid.map_id,
+        column=PlaceColumn.ACTIVATION,
+        cells=Array.of(here[None]),
+        values=Array.of(np.ones(1, np.float32)),
+        cycle=task.cycle,
+    )
+    if agent.misfits.is_lost or not task.road_m.shape[0]:
+        return Answer([activated])
 
-    return Answer(operations)
+    road_m = np.asarray(task.road_m.numpy(), np.float64)
+    near_m = road_m[np.hypot(road_m[:, 0], road_m[:, 1]) < ROAD_REACH_M]
+    points = grid.counts(grid.positions(near_m))
+    shares = np.minimum(1.0, points / ENOUGH_POINTS)
+
+    # Where rays pass, not too near or far, road would be seen if there were any.
+    range_m = grid.range_m()
+    nearest_m, farthest_m = NOT_ROAD_M
+    is_at_range = (range_m >= nearest_m) & (range_m <= farthest_m)
+    is_missed = clear_cells(rays_of(task.scan, road_m, grid), grid) & is_at_range
+    certainty = np.where((points > 0) | is_missed, grid.certainty(range_m), 0.0)
+
+    window = graph.places.window(agent.map, [PlaceColumn.ROAD], grid.extent)
+    after = blended(window.values, shares, certainty)
+    return Answer([activated, *grid.changed(window.columns, window.values, after)])
 
 
 CODELET = Codelet(
@@ -57,40 +75,3 @@ CODELET = Codelet(
     reads=frozenset({Self, PlaceColumn.ROAD}),
     writes=frozenset({PlaceColumn.ACTIVATION, PlaceColumn.ROAD}),
 )
-
-
-def _activated(grid: LocalGrid, cycle: int) -> Cells:
-    """The activation of the place node that the agent is at."""
-    position_m = grid.pose[None, :2]
-    here = np.rint(position_m / grid.cell_m).astype(np.int32)
-    full = np.ones(1, np.float32)
-
-    return Cells(
-        map=grid.map_id,
-        column=PlaceColumn.ACTIVATION,
-        cells=Array.of(here),
-        values=Array.of(full),
-        cycle=cycle,
-    )
-
-
-def _road(road: Array, scan: Array | None, grid: LocalGrid, before: Singles) -> Singles:
-    """(1, w, h): how much the cells are road after this view, `before` being how much they were."""
-    road_m = np.asarray(road.numpy(), np.float64)
-    range_m = np.hypot(road_m[:, 0], road_m[:, 1])
-    near_m = road_m[range_m < ROAD_REACH_M]
-    points = grid.counts(grid.positions(near_m))
-    shares = np.minimum(1.0, points / ENOUGH_POINTS)
-
-    is_in_view = (points > 0) | _is_missed(road_m, scan, grid)
-    certainty = grid.certainty(grid.range_m())
-    return blended(before, shares, np.where(is_in_view, certainty, 0.0))
-
-
-def _is_missed(road_m: Floats, scan: Array | None, grid: LocalGrid) -> Booleans:
-    """(w, h): the cells that are in view, and where road would be seen if there were any."""
-    rays = rays_of(scan, road_m, grid)
-    range_m = grid.range_m()
-    nearest_m, farthest_m = NOT_ROAD_M
-    is_at_range = (range_m >= nearest_m) & (range_m <= farthest_m)
-    return clear_cells(rays, grid) & is_at_range

@@ -7,130 +7,129 @@ underflows, however far the goal. The route climbs from node to neighbour up the
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import sparse
 from scipy.sparse.csgraph import dijkstra
 
 from cogmap.geometry.arrays import Floats, Indices
-from cogmap.services.codelets.planning.network import Cell, PlaceNetwork
-from cogmap.services.codelets.planning.search.links import Links
-from cogmap.services.codelets.planning.search.route import (
-    NoRoute,
-    NoRouteReason,
-    Route,
-    refusal,
-)
-from cogmap.services.codelets.planning.search.slots import MAX_COST_M
+from cogmap.graph.window import LINK_OFFSETS
+from cogmap.services.codelets.planning.network import Cell, PlaceNetwork, ends
 
 DECAY_PER_CELL = 2.0
+"""Paper §5.5."""
+
+COST_UNIT_M = 2.0**-20
+"""Costs are multiples of this, so that their sums are exact and ties are ties on every machine."""
+
+_NONE = -1
+
+
+class Links:
+    """The links of a network as costs.
+
+    Its nodes are the places that have a link, numbered from 0 in the order of their cells: `places`
+    (n,) are their indices in an array of all cells, `number` (w, h) is -1 elsewhere. `matrix`
+    (n, n) has the cost of each link once.
+    """
+
+    def __init__(self, network: PlaceNetwork) -> None:
+        weights = np.zeros_like(network.weights)
+        is_linked = np.zeros(network.shape, bool)
+        for number, offset in enumerate(LINK_OFFSETS.tolist()):
+            here, there = ends(network.shape, offset)
+            inside = network.weights[number][here]
+            weights[number][here] = inside
+            is_linked[here] |= inside > 0
+            is_linked[there] |= inside > 0
+
+        _, height = network.shape
+        self.places = np.flatnonzero(is_linked)
+        self.number = np.full(network.shape, _NONE, np.int32)
+        self.number.ravel()[self.places] = np.arange(len(self.places), dtype=np.int32)
+
+        # Open links in the order of the nodes that own them, as rows of the matrix must be.
+        weights = weights.reshape(len(LINK_OFFSETS), -1)[:, self.places].T
+        owner, direction = np.nonzero(weights)
+        beyond = self.places[owner] + (LINK_OFFSETS @ (height, 1))[direction]
+        units = np.hypot(*LINK_OFFSETS.T) * (network.cell_m / COST_UNIT_M)
+        costs_m = np.ceil(units[direction] / weights[owner, direction].clip(max=1.0)) * COST_UNIT_M
+
+        count = len(self.places)
+        starts = np.concatenate([[0], np.count_nonzero(weights, axis=1).cumsum()])
+        entries = (costs_m, self.number.ravel()[beyond], starts.astype(np.int32))
+        self.matrix = sparse.csr_matrix(entries, shape=(count, count))
 
 
 @dataclass(frozen=True)
 class Field:
-    """Activation over the nodes of a network, by the links that it had.
+    """Activation over the nodes of a network.
 
-    `node_distance_m`: the cost of the cheapest route to the nearest goal, by the nodes of `links`;
-    inf where no activation arrives.
+    `distance_m`: (width, height), the cost of the cheapest route to the nearest goal; inf where no
+    activation arrives. `upward`: (n,), for each node the one that passed on most activation to it.
     """
 
+    network: PlaceNetwork
     links: Links
-    node_distance_m: Floats
-
-    @property
-    def distance_m(self) -> Floats:
-        """(width, height): the cost of the cheapest route to the nearest goal, inf where no
-        activation arrives.
-        """
-        links = self.links
-        width, height = links.shape
-        padded = self.node_distance_m.reshape(links.width, links.height)
-        return padded[:width, :height]
+    distance_m: Floats
+    upward: Indices
 
     @property
     def log_activation(self) -> Floats:
-        """(width, height): the logarithm of the activation, which is 1 at a goal."""
-        log: Floats = -DECAY_PER_CELL * self.distance_m / self.links.cell_m
+        """Return the logarithm of the activation (width, height), which is 1 at a goal."""
+        log: Floats = -DECAY_PER_CELL * self.distance_m / self.network.cell_m
         return log
 
     @property
     def activation(self) -> Floats:
-        """(width, height): the activation, 0 where none arrives, or too little to represent."""
+        """Return the activation (width, height), 0 if none arrives or too little to represent."""
         return np.exp(self.log_activation)
 
+    def arrives(self, cell: Cell) -> bool:
+        """Decide whether activation arrives at a cell of the map."""
+        is_inside = self.network.contains(cell)
+        return is_inside and math.isfinite(self.distance_m[self.network.index_of(cell)])
 
-def spread(network: PlaceNetwork, goals: Indices) -> Field:
-    """The activation from `goals`, (k, 2) cells of the map; those outside are ignored.
+    def climb(self, start: Cell) -> Indices | None:
+        """Return the (n, 2) cells from `start` to a goal, up the activation; None if none arrives
+        at the start.
+        """
+        if not self.arrives(start):
+            return None
 
-    Whoever plans again and again on one network keeps its Links, and calls `spread_over`.
+        node = int(self.links.number[self.network.index_of(start)])
+        if node == _NONE:
+            return np.array([start], np.int64)
+
+        nodes = [node]
+        while self.upward[nodes[-1]] >= 0:
+            nodes.append(int(self.upward[nodes[-1]]))
+
+        i, j = np.unravel_index(self.links.places[nodes], self.network.shape)
+        cells: Indices = np.column_stack([i, j]) + np.array(self.network.origin)
+        return cells
+
+
+def spread(network: PlaceNetwork, goals: Indices, links: Links | None = None) -> Field:
+    """Spread activation from `goals`, (k, 2) cells of the map; those outside are ignored.
+
+    Whoever spreads several times over one network makes its `links` once.
     """
-    return spread_over(Links(network), goals)
-
-
-def spread_over(links: Links, goals: Indices) -> Field:
-    """The activation from `goals`, (k, 2) cells of the map; those outside are ignored."""
+    links = links or Links(network)
+    distance_m = np.full(network.shape, np.inf)
     nodes = []
     for i, j in goals.tolist():
-        if links.contain((i, j)):
-            nodes.append(links.node((i, j)))
+        if network.contains((i, j)):
+            place = network.index_of((i, j))
+            distance_m[place] = 0.0
+            nodes.append(int(links.number[place]))
 
-    if not nodes:
-        return Field(links, np.full(links.count, np.inf))
-
-    distance_m = dijkstra(links.matrix(), indices=nodes, min_only=True, limit=MAX_COST_M)
-    return Field(links, distance_m)
-
-
-def climb(network: PlaceNetwork, field: Field, start: Cell) -> Indices | None:
-    """(n, 2) cells from `start` to a goal, each the neighbour that passed on most activation.
-
-    Of equal ones the first in the order of NEIGHBOUR_OFFSETS is taken. None where no activation
-    arrives at the start. Links are those that the field spread over, whatever became of them since,
-    so that the route has no loop.
-    """
-    if not network.contains(start):
-        return None
-
-    links = field.links
-    nodes = _climb(field, links.node(start))
-    if nodes is None:
-        return None
-
-    return links.cells(nodes)
-
-
-def find_route(network: PlaceNetwork, start: Cell, goal: Cell) -> Route | NoRoute:
-    """The cheapest route between two cells of the map, or the reason why there is none.
-
-    Whoever plans again and again on one network keeps a FlatPlanner or HierarchicalPlanner.
-    """
-    links = Links(network)
-    refused = refusal(links, start, goal)
-    if refused is not None:
-        return refused
-
-    field = spread_over(links, np.array([goal]))
-    start_node = links.node(start)
-    nodes = _climb(field, start_node)
-    if nodes is None:
-        return NoRoute(NoRouteReason.NOT_CONNECTED)
-
-    cost_m = float(field.node_distance_m[start_node])
-    return Route(links.cells(nodes), links.cell_m, cost_m)
-
-
-def _climb(field: Field, start: int) -> Indices | None:
-    """The nodes from `start` to a goal; None where no activation arrives."""
-    links = field.links
-    distances_m = field.node_distance_m
-    if not np.isfinite(distances_m[start]):
-        return None
-
-    nodes = [start]
-    while distances_m[nodes[-1]] > 0:
-        neighbours = links.neighbours[nodes[-1]]
-        through_m = distances_m[neighbours] + links.costs_m[nodes[-1]]
-        best = neighbours[through_m.argmin()]
-        nodes.append(int(best))
-
-    return np.array(nodes)
+    upward: Indices = np.full(len(links.places), _NONE)
+    nodes = [node for node in nodes if node != _NONE]
+    if nodes:
+        distance_m.ravel()[links.places], upward, _ = dijkstra(
+            links.matrix, directed=False, indices=nodes, min_only=True, return_predecessors=True
+        )
+    return Field(network, links, distance_m, upward)

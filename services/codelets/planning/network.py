@@ -10,7 +10,6 @@ from scipy import ndimage
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS
 
-NEIGHBOUR_OFFSETS: Indices = np.concatenate([LINK_OFFSETS, -LINK_OFFSETS])
 SQUARE = np.ones((3, 3), bool)
 Cell = tuple[int, int]
 Slices = tuple[slice, slice]
@@ -30,102 +29,105 @@ class PlaceNetwork(NamedTuple):
 
     @property
     def shape(self) -> tuple[int, int]:
-        """How many cells wide and high."""
+        """Count the cells in width and height."""
         _, width, height = self.weights.shape
         return width, height
 
     def contains(self, cell: Cell) -> bool:
-        """Whether a cell of the map lies in the network."""
+        """Decide whether a cell of the map lies in the network."""
         i, j = self.index_of(cell)
         width, height = self.shape
-        is_inside_i = 0 <= i < width
-        is_inside_j = 0 <= j < height
-        return is_inside_i and is_inside_j
+        return 0 <= i < width and 0 <= j < height
 
     def index_of(self, cell: Cell) -> Cell:
-        """The index in arrays of this network of a cell of the map."""
+        """Return the index in arrays of this network of a cell of the map."""
         i, j = cell
         first_i, first_j = self.origin
         return i - first_i, j - first_j
 
 
-class Here(NamedTuple):
-    """The rectangle of place nodes that is planned on."""
+class PlaceGrid(NamedTuple):
+    """The cells of a rectangle of a map, the first of them `origin`."""
 
-    origin: tuple[int, int]
+    origin: Cell
     shape: tuple[int, int]
     cell_m: float
 
-    def network(self, weights: Singles) -> PlaceNetwork:
-        """Its place network, with links of (4, w, h) weights."""
-        return PlaceNetwork(self.origin, self.cell_m, weights)
-
     def at(self, positions_m: Floats, values: Booleans) -> Booleans:
-        """(n,): the (w, h) values at (n, 2) positions, false outside."""
+        """Return the (w, h) values at (n, 2) positions, false outside."""
         cells, is_inside = self._cells(positions_m)
         found = np.zeros(len(positions_m), bool)
         found[is_inside] = values[tuple(cells[is_inside].T)]
         return found
 
     def has(self, positions_m: Floats) -> Booleans:
-        """(w, h): the cells of (n, 2) positions."""
+        """Mark the cells (w, h) of (n, 2) positions."""
         cells, is_inside = self._cells(positions_m)
         has = np.zeros(self.shape, bool)
         has[tuple(cells[is_inside].T)] = True
         return has
 
-    def least(self, positions_m: Floats, values: Floats) -> Floats:
-        """(w, h): the least of the (n,) values at (n, 2) positions in each cell, infinite where
+    def minimum(self, positions_m: Floats, values: Floats) -> Floats:
+        """(w, h): the minimum of the (n,) values at (n, 2) positions in each cell, infinite where
         there is none.
         """
         cells, is_inside = self._cells(positions_m)
-        least = np.full(self.shape, np.inf)
-        np.minimum.at(least, tuple(cells[is_inside].T), values[is_inside])
-        return least
+        minimum = np.full(self.shape, np.inf)
+        np.minimum.at(minimum, tuple(cells[is_inside].T), values[is_inside])
+        return minimum
 
     def is_within(self, within_m: float, positions_m: Floats) -> Booleans:
-        """(w, h): the cells within a distance of any of (n, 2) positions."""
+        """Mark the cells (w, h) within a distance of any of (n, 2) positions."""
         has = self.has(positions_m)
+        is_within = np.zeros(self.shape, bool)
         if not has.any():
-            return has
+            return is_within
 
-        distance_m = ndimage.distance_transform_edt(~has) * self.cell_m
-        return np.asarray(distance_m <= within_m)
+        # Distances are computed around the positions alone, often a small part of the map.
+        margin = int(np.ceil(within_m / self.cell_m))
+        i = np.flatnonzero(has.any(axis=1))
+        j = np.flatnonzero(has.any(axis=0))
+        around = (
+            slice(max(0, int(i[0]) - margin), int(i[-1]) + margin + 1),
+            slice(max(0, int(j[0]) - margin), int(j[-1]) + margin + 1),
+        )
+        distance_m = ndimage.distance_transform_edt(~has[around]) * self.cell_m
+        is_within[around] = distance_m <= within_m
+        return is_within
 
     def _cells(self, positions_m: Floats) -> tuple[Indices, Booleans]:
-        """(n, 2) and (n,): the indices of positions, and which are inside."""
+        """Return the (n, 2) indices of positions, and which of them are inside."""
         cells = np.rint(positions_m / self.cell_m).astype(np.int64) - np.array(self.origin)
         return cells, ((cells >= 0) & (cells < self.shape)).all(axis=1)
 
 
-def grid_network(free: Booleans, cell_m: float = 1.0, origin: Cell = (0, 0)) -> PlaceNetwork:
-    """The network of a grid whose cells are `free`, (width, height), or blocked.
+def place_network(cost: Floats, cell_m: float = 1.0, origin: Cell = (0, 0)) -> PlaceNetwork:
+    """Make the network of places that cost so many times their length to drive over, (w, h), at
+    least 1; infinite where they are blocked.
 
-    A diagonal link exists only where both cells beside it are free too: no corner is cut.
+    A link costs as much as the dearer of the two places that it joins. A diagonal link exists only
+    if neither place beside it is blocked: no corner is cut.
     """
-    around = np.pad(free, 1)
-    width, height = free.shape
-    weights = np.empty((len(LINK_OFFSETS), width, height), np.float32)
+    ease = (1 / cost).astype(np.float32)
+    weights = np.zeros((len(LINK_OFFSETS), *cost.shape), np.float32)
+    for number, (di, dj) in enumerate(LINK_OFFSETS.tolist()):
+        here, there = ends(cost.shape, (di, dj))
+        along_i = there[0], here[1]
+        along_j = here[0], there[1]
 
-    for link, (di, dj) in enumerate(LINK_OFFSETS.tolist()):
-        beside_i = _shifted(around, di, 0)
-        beside_j = _shifted(around, 0, dj)
-        across = _shifted(around, di, dj)
-        weights[link] = free & beside_i & beside_j & across
+        weights[number][here] = np.minimum(ease[here], ease[there])
+        weights[number][here] *= (ease[along_i] > 0) & (ease[along_j] > 0)
 
     return PlaceNetwork(origin, cell_m, weights)
 
 
-def _shifted(around: Booleans, di: int, dj: int) -> Booleans:
-    """The neighbours at an offset, of a grid that is padded by one cell on each side."""
-    width, height = around.shape
-    i = slice(1 + di, width - 1 + di)
-    j = slice(1 + dj, height - 1 + dj)
-    return around[i, j]
+def grid_network(free: Booleans, cell_m: float = 1.0, origin: Cell = (0, 0)) -> PlaceNetwork:
+    """Make the network of a grid whose cells are `free`, (width, height), or blocked."""
+    return place_network(np.where(free, 1.0, np.inf), cell_m, origin)
 
 
-def ends(shape: tuple[int, int], offset: tuple[int, int]) -> tuple[Slices, Slices]:
-    """The places of a (w, h) grid that have a neighbour at `offset`, and those neighbours."""
+def ends(shape: tuple[int, ...], offset: tuple[int, int]) -> tuple[Slices, Slices]:
+    """Return the places of a (w, h) grid with a neighbour at `offset`, and those neighbours."""
     here = []
     there = []
     for size, step in zip(shape, offset, strict=True):
@@ -135,9 +137,9 @@ def ends(shape: tuple[int, int], offset: tuple[int, int]) -> tuple[Slices, Slice
     return (here[0], here[1]), (there[0], there[1])
 
 
-def link_weights(weights: Singles, share: Floats) -> Singles:
-    """(4, w, h): the weights of links that are not cut, by the lower share of the two places each
-    joins.
+def uncut_links(weights: Singles, share: Floats) -> Singles:
+    """Return the (4, w, h) weights of links that are not cut, by the lower share of the two places
+    each joins.
     """
     _, width, height = weights.shape
     links = np.zeros_like(weights)

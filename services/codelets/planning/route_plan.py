@@ -1,11 +1,12 @@
-"""The route-plan codelet: the shortest route to the next goal, or to a frontier where the agent
+"""The route-plan codelet: the cheapest route to the next goal, or to a frontier while the agent
 explores, as a node of the Workspace (paper §5.5).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -13,14 +14,17 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.graph.graph import Graph
+from cogmap.graph.window import LINK_OFFSETS
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.cognition import Direction, RouteReplay
 from cogmap.schemas.graph import DropLink, Link, Operation, Phase
 from cogmap.schemas.nodes import (
+    MAX_DETOUR_M,
     PLAN_ID,
     SELF_ID,
+    CostLayer,
     Goal,
     LinkKind,
     Map,
@@ -32,22 +36,19 @@ from cogmap.schemas.nodes import (
     Self,
     place_id,
 )
+from cogmap.services.codelets.planning.activation import Field, Links, spread
 from cogmap.services.codelets.planning.config import SECTION, Config
 from cogmap.services.codelets.planning.corridor import corridor
-from cogmap.services.codelets.planning.doubt import doubted, may_doubt
-from cogmap.services.codelets.planning.frontier import Standpoint, best_frontier
-from cogmap.services.codelets.planning.goal_order import goal_order, order_before
-from cogmap.services.codelets.planning.ground import COLUMNS, Ground, ground
-from cogmap.services.codelets.planning.network import PlaceNetwork
-from cogmap.services.codelets.planning.routes import (
-    Visit,
-    cost_m,
-    lengths_m,
-    route_to,
-    visits,
+from cogmap.services.codelets.planning.frontier import (
+    SAME_FRONTIER_CELLS,
+    Standpoint,
+    best_frontier,
 )
+from cogmap.services.codelets.planning.line_of_sight import straightened
+from cogmap.services.codelets.planning.network import Cell, PlaceNetwork
+from cogmap.services.codelets.planning.place_cost import COLUMNS, PlaceCosts, place_costs
+from cogmap.services.codelets.planning.replanning import is_done, is_urgent
 from cogmap.services.codelets.planning.targets import (
-    Cell,
     Target,
     as_reached,
     goals_m,
@@ -61,15 +62,22 @@ from cogmap.services.codelets.planning.targets import (
     pending_goals,
     target_of,
 )
-from cogmap.services.codelets.planning.taut import taut
-from cogmap.services.codelets.planning.urgency import is_done, is_urgent
+from cogmap.services.codelets.planning.tours import TourSettings, order_from, route_length
 
 START_M = 6.0
+"""Within so far of the agent a route may begin: a place where it fits is near a street."""
+
+KEEP_ROUTE = 1.15
+"""A route is kept while it costs at most so many times a new one, so that the agent does not waver.
+Chosen on simulated towns."""
+
+OFF_ROUTE_M = 3.0
+"""From its route, at which the agent plans anew: half a street's width."""
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task every `replan_cycles`, and at once where a goal is new or the route has ended or is
-    blocked.
+    """Return one task every `replan_cycles`, and at once if a goal is new or the route has ended or
+    is blocked.
     """
     if graph.agent is None or is_done(graph, config):
         return []
@@ -81,92 +89,42 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """Goals that are reached, and a new plan where the last one does not serve any longer."""
+    """Return goals that are reached, and a new plan if the last one does not serve any longer."""
     agent = graph.agent
     if agent is None:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
 
-    before = graph.get(Plan, PLAN_ID)
-    near = corridor(graph, agent, goals_m(graph), config)
-    if near is not None:
-        where = ground(graph, agent, config, within=near)
-        planned = _planned(Situation(task, agent, where, before, config), graph)
-        if not planned.plan.unreachable and not planned.plan.doubtful:
-            return _answer(planned, graph)
+    situation = Situation(task, graph, agent, config, graph.get(Plan, PLAN_ID))
+    within = corridor(graph, agent, goals_m(graph, agent), config)
+    if within is not None:
+        outcome = planned(situation, place_costs(graph, agent, config, within=within))
+        if not outcome.plan.unreachable and not outcome.plan.doubtful:
+            return answer(outcome, situation)
 
-    where = ground(graph, agent, config, [*pending_goals(graph).values()])
-    return _answer(_planned(Situation(task, agent, where, before, config), graph), graph)
-
-
-def _planned(now: Situation, graph: Graph) -> Planned:
-    """What is planned on the ground of a situation."""
-    targets = [target_of(goal, graph, now.where, now.config) for goal in open_goals(graph)]
-    here = [target.goal for target in targets if is_at(target, now.agent, now.where, now.config)]
-    reached = [goal for goal in here if is_satisfied(goal, graph, now.config)]
-    at = {goal.id for goal in reached}
-    left = [target_of(goal, graph, now.where, now.config) for goal in open_goals(graph, at)]
-    return Planned(now, reached, left, _plan_for(here, at, left, graph, now))
-
-
-def _plan_for(
-    here: list[Goal], at: set[str], left: list[Target], graph: Graph, now: Situation
-) -> Plan:
-    """The plan of an agent that is at some goals, those reached with the ids `at`: it rests where a
-    need is being satisfied.
-    """
-    if len(at) < len(here):
-        return _routeless(PlanState.RESTS, now)
-    if has_arrived(graph, at):
-        return _routeless(PlanState.AT_GOAL, now)
-    return _plan(most_pressing(left), now)
-
-
-def _answer(planned: Planned, graph: Graph) -> Answer:
-    """The plan, where it is another than before, and the goals that are reached."""
-    now, reached, left, plan = planned
-    answer = Answer()
-    answer.operations.extend(_links_to_places(left, now.agent.map, graph))
-    for goal in reached:
-        answer.operations.append(as_reached(goal, now.task.stamp_ns))
-        if now.before is not None and goal.id == next_goal(now.before):
-            answer.events.append(_replay(now.before, Direction.REVERSE, now))
-
-    if not _serves(plan, now):
-        answer.operations.extend(_written(plan, now.before))
-        answer.operations.extend(doubted(plan, now.before, left))
-        if plan.route is not None and next_goal(plan) != next_goal(now.before):
-            answer.events.append(_replay(plan, Direction.FORWARD, now))
-
-    return answer
+    goals = [*pending_goals(graph).values()]
+    return answer(planned(situation, place_costs(graph, agent, config, goals)), situation)
 
 
 class Situation(NamedTuple):
-    """What a plan is made from: the agent, the ground around it, and the plan before."""
+    """What is planned for: the graph, the agent in it, and the plan before."""
 
     task: Task
+    graph: Graph
     agent: Self
-    where: Ground
-    before: Plan | None
     config: Config
-
-    @property
-    def start(self) -> Cell | None:
-        """The free place nearest to the agent."""
-        agent = self.agent
-        return nearest_free(agent.x_m, agent.y_m, self.where, self.where.is_free, START_M)
-
-    def may_doubt(self, goal: Goal) -> bool:
-        """Whether blocked road may be tried for a goal."""
-        return may_doubt(goal, self.before, self.task.stamp_ns, self.config)
+    before: Plan | None
 
 
-class Planned(NamedTuple):
-    """In a situation, the goals that are reached, those that are left, and the plan for these."""
+class Outcome(NamedTuple):
+    """The goals that are reached, those that are left, and the plan for these, by the costs of
+    places and the network that its route leads over.
+    """
 
-    now: Situation
     reached: list[Goal]
     left: list[Target]
     plan: Plan
+    costs: PlaceCosts
+    network: PlaceNetwork
 
 
 CODELET = Codelet(
@@ -181,193 +139,253 @@ CODELET = Codelet(
 )
 
 
-def _links_to_places(targets: list[Target], map_id: str, graph: Graph) -> list[Operation]:
-    """The links of goals to the place nodes from which they are reached, where these are new."""
-    links: list[Operation] = []
-    for target in targets:
-        if target.cell is None:
-            continue
-
-        goal = target.goal.id
-        place = place_id(*target.cell, map_id)
-        if graph.links.target(goal, LinkKind.AT) != place:
-            links.append(Link(source=goal, target=place, kind=LinkKind.AT))
-
-    return links
-
-
-def _plan(targets: list[Target], now: Situation) -> Plan:
-    """A plan for the goals that are left; to explore, where none has a route and that is wanted."""
-    plan = _routeless(PlanState.NO_GOAL, now)
-    start = now.start
-    if start is None:
-        unreachable = {target.goal.id: PlanState.BLOCKED for target in targets}
-        return msgspec.structs.replace(plan, state=PlanState.BLOCKED, unreachable=unreachable)
-
-    found, unreachable = _reachable(start, targets, now)
-    plan = msgspec.structs.replace(plan, unreachable=unreachable)
-    if found:
-        return _to_goals(plan, start, found, now)
-
-    if now.config.explore:
-        plan = _to_frontier(plan, start, now)
-    if plan.route is None and unreachable:
-        state = next(iter(unreachable.values()))
-        plan = msgspec.structs.replace(plan, state=state)
-    return plan
-
-
-def _routeless(state: PlanState, now: Situation) -> Plan:
-    """A plan without a route, in this state."""
-    return Plan(
+def planned(situation: Situation, costs: PlaceCosts) -> Outcome:
+    """Plan on places of these costs."""
+    task, graph, agent, config, _ = situation
+    network = costs.network()
+    plan = Plan(
         id=PLAN_ID,
         base_level=1.0,
-        map=now.agent.map,
-        state=state,
-        planned_ns=now.task.stamp_ns,
+        map=agent.map,
+        state=PlanState.NO_GOAL,
+        planned_ns=task.stamp_ns,
     )
 
+    targets = [target_of(goal, graph, agent, costs, config) for goal in open_goals(graph)]
+    here = [target.goal for target in targets if is_at(target, agent, costs, config)]
+    reached = [goal for goal in here if is_satisfied(goal, graph, config)]
+    at = {goal.id for goal in reached}
+    left = [target_of(goal, graph, agent, costs, config) for goal in open_goals(graph, at)]
 
-def _reachable(
-    start: Cell, targets: list[Target], now: Situation
-) -> tuple[list[Visit], dict[str, PlanState]]:
-    """The targets to which routes lead from `start`, and why none leads to the others.
+    def outcome(over: PlaceNetwork = network, **changes: Any) -> Outcome:
+        changed = msgspec.structs.replace(plan, **changes)
+        return Outcome(reached, left, changed, costs, over)
 
-    Where a street that was blocked is the only one that is left, it may be free again.
-    """
-    where = now.where
-    at_start = where.network.index_of(start)
-    unreachable = {target.goal.id: target.state for target in targets if target.cell is None}
+    # At a goal that serves a need, the agent rests until the need is satisfied.
+    if len(reached) < len(here):
+        return outcome(state=PlanState.RESTS)
+    if has_arrived(graph, at):
+        return outcome(state=PlanState.AT_GOAL)
 
-    found = [visit for visit in visits(where.network, targets) if _arrives(visit, at_start)]
-    left = _without(targets, found)
-    in_doubt = [target for target in left if now.may_doubt(target.goal)]
-    found += [visit for visit in visits(where.doubted, in_doubt) if _arrives(visit, at_start)]
+    targets = most_pressing(left)
+    start = nearest_free(agent.x_m, agent.y_m, costs, costs.is_free, START_M)
+    if start is None:
+        unreachable = {target.goal.id: PlanState.BLOCKED for target in targets}
+        return outcome(state=PlanState.BLOCKED, unreachable=unreachable)
 
-    for target in _without(targets, found):
-        if target.cell is not None:
+    # Activation spreads from each goal; those at which the agent is not activated have no route.
+    found: list[Visit] = []
+    unreachable = {}
+    links = Links(network) if targets else None
+    for target in targets:
+        if not target.cells:
+            unreachable[target.goal.id] = target.state
+            continue
+        field = spread(network, np.array(target.cells), links)
+        route = field.climb(start)
+        if route is None:
             unreachable[target.goal.id] = PlanState.NO_ROUTE
+        else:
+            found.append(Visit(target.goal, route, field))
 
-    return found, unreachable
+    if found:
+        ordered = _ordered(found, start, situation, network)
+        cells = ordered[0].route
+        line = straightened(cells, costs.cost(), network.origin)
+        return outcome(
+            state=PlanState.READY,
+            goals=[visit.goal.id for visit in ordered],
+            unreachable=unreachable,
+            doubtful=not costs.is_free[tuple((cells - network.origin).T)].all(),
+            **_along(line * network.cell_m),
+        )
 
+    if config.explore:
+        network = costs.known_network()
+        field = spread(network, np.array([start]))
+        standpoint = Standpoint(start, agent.heading_rad)
+        frontier = best_frontier(costs, field, standpoint, config, _frontier_before(situation))
+        back = None if frontier is None else field.climb(frontier.cell)
+        if back is not None:
+            return outcome(
+                network,
+                state=PlanState.READY,
+                explores=True,
+                unreachable=unreachable,
+                **_along(back[::-1].astype(np.float64) * network.cell_m),
+            )
 
-def _arrives(visit: Visit, index: Cell) -> bool:
-    """Whether activation arrives from a target at the place of that index."""
-    return math.isfinite(visit.field.distance_m[index])
-
-
-def _without(targets: list[Target], found: list[Visit]) -> list[Target]:
-    """The targets that were not found."""
-    names = {visit.target.goal.id for visit in found}
-    return [target for target in targets if target.goal.id not in names]
-
-
-def _to_goals(plan: Plan, start: Cell, found: list[Visit], now: Situation) -> Plan:
-    """The plan with the order of the goals found, and the route to the first."""
-    lengths = lengths_m(now.where.network, start, found)
-    cells = np.array([start, *(visit.cell for visit in found)])
-    positions_m = cells * now.where.network.cell_m
-    names = [visit.target.goal.id for visit in found]
-    planned = [] if now.before is None else now.before.goals
-
-    order = goal_order(lengths, positions_m, order_before(names, planned), now.config)
-    ordered = [found[number] for number in order]
-
-    route = route_to(start, ordered[0])
-    assert route is not None
-    goals = [visit.target.goal.id for visit in ordered]
-    is_doubtful = ordered[0].network is now.where.doubted
-    plan = msgspec.structs.replace(plan, goals=goals, doubtful=is_doubtful)
-    where = now.where
-    # Agents kept less energy where such routes were taut: these lead nearer to kerbs.
-    if ordered[0].target.goal.need:
-        return _with_route(plan, route.cells, where)
-
-    line = taut(route.cells, where.network.origin, where.is_clear)
-    return _with_route(plan, line, where)
+    state = next(iter(unreachable.values()), PlanState.NO_GOAL)
+    return outcome(state=state, unreachable=unreachable)
 
 
-def _to_frontier(plan: Plan, start: Cell, now: Situation) -> Plan:
-    """The plan with a route to the frontier that promises most, where there is one."""
-    where = now.where
-    standpoint = Standpoint(start, now.agent.heading_rad)
-    frontier = best_frontier(where, standpoint, now.config, _frontier_before(now))
-    if frontier is None:
-        return plan
+def answer(outcome: Outcome, situation: Situation) -> Answer:
+    """Return the goals that are reached, and the plan, if it is another than before."""
+    reached, left, plan, costs, _ = outcome
+    task, graph, agent, _, before = situation
+    changes = Answer()
 
-    nowhere = Goal(id="frontier")
-    visit = visits(where.known, [Target(nowhere, frontier.cell)])[0]
-    route = route_to(start, visit)
-    if route is None:
-        return plan
-    return _with_route(msgspec.structs.replace(plan, explores=True), route.cells, where)
+    def away_m(cell: Cell) -> float:
+        i, j = cell
+        return math.hypot(i * costs.grid.cell_m - agent.x_m, j * costs.grid.cell_m - agent.y_m)
+
+    for target in left:
+        if not target.cells:
+            continue
+        place = place_id(*min(target.cells, key=away_m), agent.map)
+        if graph.links.target(target.goal.id, LinkKind.AT) != place:
+            changes.operations.append(Link(source=target.goal.id, target=place, kind=LinkKind.AT))
+
+    for goal in reached:
+        changes.operations.append(as_reached(goal, task.stamp_ns))
+        if before is not None and goal.id == next_goal(before):
+            changes.events.append(_replay(before, Direction.REVERSE, task, costs))
+
+    if _serves(outcome, situation):
+        return changes
+
+    if before is not None and before.route is not None and before.goals[:1] == plan.goals[:1]:
+        cells = _left_of(before, agent, costs)
+        plan = msgspec.structs.replace(plan, detour_for=_added_m(costs, cells))
+    changes.operations.extend(_written(plan, before))
+    if plan.route is not None and next_goal(plan) != next_goal(before):
+        changes.events.append(_replay(plan, Direction.FORWARD, task, costs))
+    return changes
 
 
-def _frontier_before(now: Situation) -> Cell | None:
-    """The cell of the frontier that the agent goes to by the plan before."""
-    before = now.before
+class Visit(NamedTuple):
+    """A goal, the (n, 2) cells of the route to it, and the activation that spreads from it."""
+
+    goal: Goal
+    route: Indices
+    field: Field
+
+
+def cost_m(network: PlaceNetwork, cells: Indices) -> float:
+    """Sum up what a route of (n, 2) neighbouring cells costs; infinite if a link of it is cut, or
+    leads outside.
+    """
+    inside = cells - np.array(network.origin)
+    if (inside < 0).any() or (inside >= network.shape).any():
+        return math.inf
+
+    here = inside[:-1]
+    there = inside[1:]
+    weights = np.zeros(len(here))
+    for number, offset in enumerate(LINK_OFFSETS):
+        of_link = network.weights[number]
+        forth = (there - here == offset).all(axis=1)
+        back = (here - there == offset).all(axis=1)
+        weights[forth] = of_link[tuple(here[forth].T)]
+        weights[back] = of_link[tuple(there[back].T)]
+
+    if not weights.all():
+        return math.inf
+    steps_m = np.hypot(*np.diff(cells, axis=0).T) * network.cell_m
+    return float((steps_m / weights).sum())
+
+
+def _ordered(
+    found: Sequence[Visit], start: Cell, situation: Situation, network: PlaceNetwork
+) -> list[Visit]:
+    """Return the visits in an order that makes the tour short; in that of the plan before, while it
+    is nearly as short.
+    """
+    before = situation.before
+    cells = np.array([start, *(visit.route[-1] for visit in found)])
+    i, j = (cells - np.array(network.origin)).T
+    lengths_m = np.zeros((len(cells), len(cells)))
+    for number, visit in enumerate(found, start=1):
+        lengths_m[:, number] = visit.field.distance_m[i, j]
+        lengths_m[number, :] = lengths_m[:, number]
+
+    order = order_from(lengths_m, cells * network.cell_m, TourSettings())
+    names = [visit.goal.id for visit in found]
+    if before is not None and set(names) <= set(before.goals):
+        numbers = [names.index(name) + 1 for name in before.goals if name in names]
+        kept = np.array([0, *numbers])
+        max_m = KEEP_ROUTE * route_length(lengths_m, order, closed=False)
+        if route_length(lengths_m, kept, closed=False) <= max_m:
+            order = kept
+
+    return [found[number - 1] for number in order.tolist()[1:]]
+
+
+def _frontier_before(situation: Situation) -> Cell | None:
+    """Return the cell of the frontier that the agent goes to by the plan before."""
+    before = situation.before
     if before is None or not before.explores or before.route is None:
         return None
 
-    i, j = _cells(before, now.where)[-1].tolist()
+    cell_m = situation.graph.cell_m(before.map)
+    i, j = np.rint(before.route.numpy()[-1] / cell_m).astype(np.int64).tolist()
     return i, j
 
 
-def _with_route(plan: Plan, cells: Indices | Floats, where: Ground) -> Plan:
-    """The plan, ready to be driven along a route, (n, 2) in cells."""
-    positions_m = cells * where.network.cell_m
-    ready = msgspec.structs.replace(
-        plan, state=PlanState.READY, route=Matrix.of(positions_m.astype(np.float64))
-    )
-    length_m = cost_m(_network_of(plan, where), _cells(ready, where))
-    return msgspec.structs.replace(ready, length_m=length_m)
+def _along(positions_m: Floats) -> dict[str, Any]:
+    """Return a plan's route along (n, 2) positions, and its length, as fields of the plan."""
+    length_m = float(np.hypot(*np.diff(positions_m, axis=0).T).sum())
+    return {"route": Matrix.of(positions_m.astype(np.float64)), "length_m": length_m}
 
 
-def _cells(plan: Plan, where: Ground) -> Indices:
-    """(n, 2): the place nodes of a plan's route."""
+def _cells(plan: Plan, costs: PlaceCosts) -> Indices:
+    """Return the (n, 2) place nodes of a plan's route."""
     assert plan.route is not None
-    cells = np.rint(plan.route.numpy() / where.network.cell_m)
+    cells = np.rint(plan.route.numpy() / costs.grid.cell_m)
     return cells.astype(np.int64)
 
 
-def _serves(plan: Plan, now: Situation) -> bool:
-    """Whether the plan before leads to the same goals as `plan` does, nearly as shortly, from where
-    the agent is.
+def _left_of(plan: Plan, agent: Self, costs: PlaceCosts) -> Indices:
+    """Return the (k, 2) place nodes of a plan's route from where the agent is."""
+    assert plan.route is not None
+    away_m = np.hypot(*(plan.route.numpy() - (agent.x_m, agent.y_m)).T)
+    return _cells(plan, costs)[int(away_m.argmin()) :]
+
+
+def _serves(outcome: Outcome, situation: Situation) -> bool:
+    """Decide whether the plan before leads to the same goals as a new one, nearly as cheaply, from
+    where the agent is.
     """
-    before = now.before
+    _, _, plan, costs, network = outcome
+    _, _, agent, config, before = situation
     if before is None or _aim(before) != _aim(plan):
         return False
     if before.route is None or plan.route is None:
         return before.route is plan.route
 
-    cells = _cells(before, now.where)
-    away_m = np.hypot(*(before.route.numpy() - (now.agent.x_m, now.agent.y_m)).T)
-    nearest = int(away_m.argmin())
-    moved = np.abs(cells[-1] - _cells(plan, now.where)[-1]).max()
-    is_off = away_m[nearest] > now.config.off_route_m
-    is_at_end = plan.explores and away_m[-1] <= now.config.reached_m
-    if is_off or is_at_end or moved > now.config.same_frontier_cells // 2:
+    away_m = np.hypot(*(before.route.numpy() - (agent.x_m, agent.y_m)).T)
+    cells = _cells(plan, costs)
+    moved = np.abs(_cells(before, costs)[-1] - cells[-1]).max()
+    is_off = away_m.min() > OFF_ROUTE_M
+    is_at_end = plan.explores and away_m[-1] <= config.reached_m
+    if is_off or is_at_end or moved > SAME_FRONTIER_CELLS // 2:
         return False
 
-    network = _network_of(plan, now.where)
-    left_m = cost_m(network, cells[nearest:])
-    return left_m <= now.config.keep_route * plan.length_m + network.cell_m
-
-
-def _network_of(plan: Plan, where: Ground) -> PlaceNetwork:
-    """The links that a plan's route follows."""
-    if plan.explores:
-        return where.known
-    return where.doubted if plan.doubtful else where.network
+    left_m = cost_m(network, _left_of(before, agent, costs))
+    return left_m <= KEEP_ROUTE * cost_m(network, cells) + network.cell_m
 
 
 def _aim(plan: Plan) -> tuple[object, ...]:
-    """What a plan is to reach, and what it came to."""
+    """Return what a plan is to reach, and what it came to."""
     return plan.map, plan.state, plan.explores, plan.doubtful, plan.goals, plan.unreachable
 
 
+def _added_m(costs: PlaceCosts, cells: Indices) -> dict[CostLayer, float]:
+    """Return what each layer by itself adds to a route of (k, 2) cells, in metres of free road."""
+    inside = cells - np.array(costs.grid.origin)
+    is_inside = ((inside >= 0) & (inside < costs.grid.shape)).all(axis=1)
+    i, j = inside[is_inside].T
+
+    added_m = {}
+    for layer, factor in costs.layers.items():
+        by_layer_m = float((factor[i, j] - 1).sum()) * costs.grid.cell_m
+        if by_layer_m >= 1.0:
+            added_m[layer] = min(by_layer_m, MAX_DETOUR_M)
+    return added_m
+
+
 def _written(plan: Plan, before: Plan | None) -> list[Operation]:
-    """The plan, and its link to the next goal."""
+    """Return the plan, and its link to the next goal."""
     operations: list[Operation] = [plan]
     goal = next_goal(plan)
     goal_before = next_goal(before)
@@ -379,15 +397,15 @@ def _written(plan: Plan, before: Plan | None) -> list[Operation]:
     return operations
 
 
-def _replay(plan: Plan, direction: Direction, now: Situation) -> RouteReplay:
-    """The place nodes of a plan's route, from the agent to the goal or back."""
-    cells = _cells(plan, now.where)
+def _replay(plan: Plan, direction: Direction, task: Task, costs: PlaceCosts) -> RouteReplay:
+    """Return the place nodes of a plan's route, from the agent to the goal or back."""
+    cells = _cells(plan, costs)
     if direction is Direction.REVERSE:
         cells = cells[::-1]
 
     return RouteReplay(
-        stamp_ns=now.task.stamp_ns,
-        cycle=now.task.cycle,
+        stamp_ns=task.stamp_ns,
+        cycle=task.cycle,
         direction=direction,
         goal=next_goal(plan),
         map=plan.map,

@@ -14,6 +14,7 @@ from cogmap.graph.graph import Graph
 from cogmap.schemas.graph import DropNode, Operation
 from cogmap.schemas.nodes import (
     NEVER_NS,
+    SATISFIED_BY,
     Goal,
     Need,
     Object,
@@ -24,71 +25,70 @@ from cogmap.schemas.nodes import (
     object_id,
 )
 from cogmap.services.codelets.planning.config import Config
-from cogmap.services.codelets.planning.ground import Ground
+from cogmap.services.codelets.planning.network import Cell
+from cogmap.services.codelets.planning.place_cost import PlaceCosts
 
-Cell = tuple[int, int]
+SNAP_M = 3.0
+"""Within so far a blocked position is replaced by the nearest free place: half a street's width."""
 
 
 class Target(NamedTuple):
-    """A goal, and the cell to drive to; None, with the reason, where there is none."""
+    """A goal, and the cells to drive to, any of which will do; none, with the reason, if there is
+    none.
+    """
 
     goal: Goal
-    cell: Cell | None
+    cells: list[Cell]
     state: PlanState = PlanState.READY
 
 
 def open_goals(graph: Graph, at: Collection[str] = ()) -> list[Goal]:
-    """The goals that were not reached yet, and wait for none that was not, by id; the agent is `at`
-    goals of these ids now.
+    """Return the goals that were not reached yet, and wait for none that was not, by id; the agent
+    is `at` goals of these ids now.
     """
     pending = pending_goals(graph, at)
     return [goal for goal in pending.values() if goal.after not in pending]
 
 
 def pending_goals(graph: Graph, at: Collection[str] = ()) -> dict[str, Goal]:
-    """The goals that were not reached yet, by id."""
+    """Return the goals that were not reached yet, by id."""
     goals = [goal for goal in graph.of_kind(Goal) if goal.id not in at]
     return {goal.id: goal for goal in goals if goal.reached_ns == NEVER_NS}
 
 
-def goals_m(graph: Graph) -> Floats:
-    """(n, 2): where the open goals are, without those that are at objects unknown."""
+def goals_m(graph: Graph, agent: Self) -> Floats:
+    """Return the (n, 2) positions of the open goals, without those at objects that are unknown."""
     positions_m = []
     for goal in open_goals(graph):
-        found = graph.get(Object, object_id(goal.object)) if goal.object else goal
-        if found is not None:
-            positions_m.append((found.x_m, found.y_m))
+        found = _objects_of(goal, graph, agent) if goal.object else [goal]
+        positions_m.extend([(place.x_m, place.y_m) for place in found])
 
     return np.array(positions_m, np.float64).reshape(-1, 2)
 
 
 def next_goal(plan: Plan | None) -> str:
-    """The id of a plan's next goal, empty where it has none."""
+    """Return the id of a plan's next goal, empty if it has none."""
     if plan is None or not plan.goals:
         return ""
     return plan.goals[0]
 
 
-def is_at(target: Target, agent: Self, ground: Ground, config: Config) -> bool:
-    """Whether the agent is at the place of a goal."""
-    if target.cell is None:
-        return False
-
-    i, j = target.cell
-    cell_m = ground.network.cell_m
-    away_m = math.hypot(i * cell_m - agent.x_m, j * cell_m - agent.y_m)
-    return away_m <= config.reached_m
+def is_at(target: Target, agent: Self, costs: PlaceCosts, config: Config) -> bool:
+    """Decide whether the agent is at the place of a goal."""
+    positions_m = np.array(target.cells, np.float64).reshape(-1, 2) * costs.grid.cell_m
+    away_m = np.hypot(*(positions_m - (agent.x_m, agent.y_m)).T)
+    return bool((away_m <= config.reached_m).any())
 
 
 def as_reached(goal: Goal, stamp_ns: int) -> Operation:
-    """That a goal was reached; one that served a need is forgotten."""
+    """Mark a goal as reached; forget one that served a need."""
     if goal.need:
         return DropNode(id=goal.id)
     return msgspec.structs.replace(goal, reached_ns=stamp_ns)
 
 
 def is_satisfied(goal: Goal, graph: Graph, config: Config) -> bool:
-    """Whether an agent that is at a goal has what it came for: the need that the goal serves, if
+    """Decide whether an agent at a goal has what it came for: the need that the goal serves, if
     any, is low.
     """
     need = graph.get(Need, need_id(goal.need)) if goal.need else None
@@ -96,50 +96,62 @@ def is_satisfied(goal: Goal, graph: Graph, config: Config) -> bool:
 
 
 def most_pressing(targets: list[Target]) -> list[Target]:
-    """The targets that serve a need, where there are any that have a place; otherwise all."""
-    pressing = [target for target in targets if target.goal.need and target.cell is not None]
+    """Return the targets that serve a need, if any of these has a place; otherwise all."""
+    pressing = [target for target in targets if target.goal.need and target.cells]
     return pressing or targets
 
 
 def has_arrived(graph: Graph, at: Collection[str] = ()) -> bool:
-    """Whether there are goals, and all are reached."""
+    """Decide whether there are goals, and all are reached."""
     has_goals = any(True for _ in graph.of_kind(Goal))
     return has_goals and not pending_goals(graph, at)
 
 
-def target_of(goal: Goal, graph: Graph, ground: Ground, config: Config) -> Target:
-    """The free place nearest to a goal.
+def target_of(goal: Goal, graph: Graph, agent: Self, costs: PlaceCosts, config: Config) -> Target:
+    """Find the free places nearest to a goal.
 
-    An object is reached from a known place within `approach_m`; a position that is not free from a
-    place within `snap_m`.
+    An object is reached from a known place within `approach_m`, and a goal that serves a need at
+    any object of the agent's map that satisfies it. A position that is not free is reached from a
+    place within SNAP_M.
     """
-    x_m = goal.x_m
-    y_m = goal.y_m
     if goal.object:
-        found = graph.get(Object, object_id(goal.object))
-        if found is None:
-            return Target(goal, None, PlanState.UNKNOWN_GOAL)
+        found = _objects_of(goal, graph, agent)
+        if not found:
+            return Target(goal, [], PlanState.UNKNOWN_GOAL)
 
-        cell = nearest_free(found.x_m, found.y_m, ground, ground.is_known, config.approach_m)
-        if cell is None:
-            return Target(goal, None, PlanState.NO_ROUTE)
-        return Target(goal, cell)
+        cells = []
+        for node in found:
+            cell = nearest_free(node.x_m, node.y_m, costs, costs.is_known_free, config.approach_m)
+            if cell is not None:
+                cells.append(cell)
+        return Target(goal, cells, PlanState.READY if cells else PlanState.NO_ROUTE)
 
-    if not _is_inside(x_m, y_m, ground):
-        return Target(goal, None, PlanState.OUTSIDE)
+    if not costs.grid.has(np.array([[goal.x_m, goal.y_m]])).any():
+        return Target(goal, [], PlanState.OUTSIDE)
 
-    cell = nearest_free(x_m, y_m, ground, ground.is_free, config.snap_m)
+    cell = nearest_free(goal.x_m, goal.y_m, costs, costs.is_free, SNAP_M)
     if cell is None:
-        return Target(goal, None, PlanState.BLOCKED)
-    return Target(goal, cell)
+        return Target(goal, [], PlanState.BLOCKED)
+    return Target(goal, [cell])
+
+
+def _objects_of(goal: Goal, graph: Graph, agent: Self) -> list[Object]:
+    """Return the objects at which a goal is reached."""
+    named = graph.get(Object, object_id(goal.object))
+    function = SATISFIED_BY.get(goal.need)
+    if named is None or function is None:
+        return [] if named is None else [named]
+
+    satisfying = [node for node in graph.of_kind(Object) if node.function == function]
+    return [node for node in satisfying if node.map == agent.map] or [named]
 
 
 def nearest_free(
-    x_m: float, y_m: float, ground: Ground, is_free: Booleans, within_m: float
+    x_m: float, y_m: float, costs: PlaceCosts, is_free: Booleans, within_m: float
 ) -> Cell | None:
-    """The cell of `is_free` (w, h) nearest to a position; None where none is within `within_m`."""
-    i0, j0 = ground.network.origin
-    cell_m = ground.network.cell_m
+    """Return the cell of `is_free` (w, h) nearest to a position, None if none is within reach."""
+    i0, j0 = costs.grid.origin
+    cell_m = costs.grid.cell_m
     reach = math.ceil(within_m / cell_m)
     i = round(x_m / cell_m) - i0
     j = round(y_m / cell_m) - j0
@@ -159,9 +171,3 @@ def nearest_free(
 
     found_i, found_j = cells[nearest].tolist()
     return found_i, found_j
-
-
-def _is_inside(x_m: float, y_m: float, ground: Ground) -> bool:
-    """Whether a position is on the ground's rectangle."""
-    cell_m = ground.network.cell_m
-    return ground.network.contains((round(x_m / cell_m), round(y_m / cell_m)))

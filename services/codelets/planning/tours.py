@@ -44,7 +44,7 @@ class TourSettings(NamedTuple):
 
 
 def order(lengths: Floats, positions_m: Floats, settings: TourSettings) -> Indices:
-    """The order (n,) in which a closed tour visits n goals, beginning with goal 0.
+    """Find the order (n,) in which a closed tour visits n goals, beginning with goal 0.
 
     `lengths` (n, n), in any one unit, are symmetric and finite; `positions_m` (n, 2) are where the
     goals lie on the map. Raises CogmapError where `lengths` are not so.
@@ -53,7 +53,7 @@ def order(lengths: Floats, positions_m: Floats, settings: TourSettings) -> Indic
 
 
 def order_from(lengths: Floats, positions_m: Floats, settings: TourSettings) -> Indices:
-    """The order (n,) of a route from point 0, the agent, past all other points; it ends at the
+    """Find the order (n,) of a route from point 0, the agent, past all other points; it ends at the
     last.
 
     Otherwise as `order`.
@@ -62,7 +62,7 @@ def order_from(lengths: Floats, positions_m: Floats, settings: TourSettings) -> 
 
 
 def follow_activation(lengths: Floats) -> Indices:
-    """The order (n,) on one flat grid (figure 5 C): from goal 0 on, always to the goal whose
+    """Find the order (n,) on one flat grid (figure 5 C): from goal 0 on, always to the goal whose
     activation is highest there, which is the nearest; of equally near ones the first.
 
     Raises CogmapError as `order` does.
@@ -82,7 +82,9 @@ def follow_activation(lengths: Floats) -> Indices:
 
 
 def route_length(lengths: Floats, visited: Indices, *, closed: bool) -> float:
-    """Of the route past `visited` (n,) in that order, and back to the first where it is closed."""
+    """Measure the route past `visited` (n,) in that order, and back to the first where it is
+    closed.
+    """
     following = np.roll(visited, -1)
     legs = lengths[visited, following]
     if not closed:
@@ -109,6 +111,9 @@ def _ordered(
     units: Indices, positions_m: Floats, settings: TourSettings, *, closed: bool
 ) -> Indices:
     end = len(units)
+    if end <= 2:
+        return np.arange(end)
+
     lengths = _with_end(units, closed)
     route = np.array([_START, end])
     clusters = [np.arange(1, end)]

@@ -42,7 +42,7 @@ COLUMNS = (*COARSE, PlaceColumn.OBSTACLE)
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task every EVERY_CYCLES."""
+    """Return one task every EVERY_CYCLES."""
     if graph.agent is None or context.cycle % EVERY_CYCLES:
         return []
     return [context.task(CODELET.name, about=[SELF_ID])]

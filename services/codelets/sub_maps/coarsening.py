@@ -50,8 +50,8 @@ def coarser(fine: Places) -> Places:
     """The coarse place nodes of a rectangle that `fine` covers with a margin of MARGIN on each
     side.
 
-    One is as much road as any place in it. A link can be traversed where some row of the finer
-    links leads from beside the one node to beside the other; diagonally, where the row between them
+    One is as much road as any place in it. A link can be traversed if some row of the finer
+    links leads from beside the one node to beside the other; diagonally, if the row between them
     does.
     """
     road = np.max([_block(fine.road, i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], axis=0)
@@ -59,25 +59,12 @@ def coarser(fine: Places) -> Places:
     is_open = np.zeros((len(LINK_OFFSETS), *road.shape), bool)
     for number, (di, dj) in enumerate(LINK_OFFSETS.tolist()):
         of_link = fine.is_open[number]
-        for aside in _asides(di, dj):
-            is_open[number] |= _row(of_link, (di, dj), aside)
+        for aside in (0,) if di and dj else (-1, 0, 1):
+            first_i, first_j = dj * aside, di * aside
+            row = [_block(of_link, first_i + k * di, first_j + k * dj) for k in range(FACTOR)]
+            is_open[number] |= np.all(row, axis=0)
 
     return Places(np.asarray(road, np.float32), is_open)
-
-
-def _asides(di: int, dj: int) -> list[tuple[int, int]]:
-    """From where the rows of finer links begin that make up a link, seen from its node."""
-    if di and dj:
-        return [(0, 0)]
-    return [(dj * aside, di * aside) for aside in (-1, 0, 1)]
-
-
-def _row(of_link: Booleans, offset: tuple[int, int], aside: tuple[int, int]) -> Booleans:
-    """(w, h): whether all of a row of FACTOR finer links in one direction are open."""
-    di, dj = offset
-    first_i, first_j = aside
-    row = [_block(of_link, first_i + k * di, first_j + k * dj) for k in range(FACTOR)]
-    return np.asarray(np.all(row, axis=0))
 
 
 def _block(values: Values, i: int, j: int) -> Values:

@@ -18,10 +18,14 @@ from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import DropNode, DropPlaces, Links, Operation, Phase
 from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, Object, map_id, object_id
 from cogmap.services.codelets.nodes import nodes_of
+from cogmap.services.codelets.sub_maps.areas import (
+    MOVED_M,
+    area_covered,
+    is_outdated,
+    sub_map_node,
+)
 from cogmap.services.codelets.sub_maps.config import SECTION, Config
 from cogmap.services.codelets.sub_maps.cut_links import CutLinks
-from cogmap.services.codelets.sub_maps.extents import MOVED_M, extent_of, is_outdated, sub_map_node
-from cogmap.services.codelets.sub_maps.labels import NEW
 from cogmap.services.codelets.sub_maps.members import (
     maps_around,
     members_of,
@@ -30,7 +34,7 @@ from cogmap.services.codelets.sub_maps.members import (
     positions_of,
     sub_maps_of,
 )
-from cogmap.services.codelets.sub_maps.sub_maps import SubMaps
+from cogmap.services.codelets.sub_maps.sub_maps import NEW, SubMaps
 
 # Views of an object before it gets into a sub-map.
 MIN_SIGHTINGS = 2
@@ -42,35 +46,56 @@ ALL_ANEW_SHARE = 0.25
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task about the objects in view that are in no sub-map yet, and about one sub-map, another
-    in each cycle, where its objects are no longer where it says; about no node where so many
+    """Return one task about the objects in view that are in no sub-map yet, and about one sub-map,
+    another in each cycle, if its objects are no longer where it says; about no node if so many
     objects are in none that all are sorted anew.
     """
     maps = sub_maps_of(graph)
-    if _are_many_new(graph, maps):
+    known = sum(len(graph.links.sources(node.id, LinkKind.WITHIN)) for node in maps)
+    new = graph.count(Object) - known
+    if new > max(ALL_ANEW_FROM, ALL_ANEW_SHARE * known):
         return [context.task(CODELET.name)]
 
-    about = _new_in_view(context, graph, config)
+    names = sorted(object_id(percept.label) for percept in context.percepts.objects)
+    about = []
+    for node in nodes_of(graph, Object, names):
+        is_sure = node.surveyed or node.sightings >= MIN_SIGHTINGS
+        if is_sure and _is_new(node, graph):
+            about.append(node.id)
+
     if maps:
         checked = maps[context.cycle % len(maps)]
         if is_outdated(checked, members_of([checked], graph)):
             about.append(checked.id)
 
-    if not about:
-        return []
-    return [context.task(CODELET.name, about)]
+    return [context.task(CODELET.name, about)] if about else []
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
     """The sub-maps around what the task is about, and the links of their objects to them."""
-    scope = _scope(task, graph, config)
-    sorted_in = _sorted(scope, graph, config)
+    scope = _scope(task, graph)
+    numbers = _sorted(scope, graph, config)
 
-    maps = _map_nodes(scope, sorted_in, graph, config)
-    links = _links(scope, sorted_in)
-    kept = set(sorted_in.tolist())
-    gone = [DropNode(id=node.id) for node in scope.maps if number_of(node) not in kept]
-    return Answer([*maps, *links, *gone])
+    # Sub-maps that are new, or cover another area than before and so have another frame.
+    operations: list[Operation] = []
+    positions_m = positions_of(scope.objects)
+    for number in np.unique(numbers).tolist():
+        area = area_covered(positions_m[numbers == number])
+        before = graph.get(Map, map_id(number))
+        if before is None or area.differs_from(before, MOVED_M):
+            operations.append(sub_map_node(number, area, graph))
+            if before is not None:
+                operations.append(DropPlaces(map=before.id))
+
+    weights = {}
+    for index in np.flatnonzero(numbers != scope.numbers).tolist():
+        weights[scope.objects[index].id] = {map_id(int(numbers[index])): 1.0}
+    if weights:
+        operations.append(Links(kind=LinkKind.WITHIN, weights=weights))
+
+    kept = set(numbers.tolist())
+    operations += [DropNode(id=node.id) for node in scope.maps if number_of(node) not in kept]
+    return Answer(operations)
 
 
 CODELET = Codelet(
@@ -96,37 +121,14 @@ class _Scope(NamedTuple):
     all_anew: bool
 
 
-def _are_many_new(graph: Graph, maps: list[Map]) -> bool:
-    """Whether to sort all objects anew."""
-    known = 0
-    for node in maps:
-        known += len(graph.links.sources(node.id, LinkKind.WITHIN))
-
-    new = graph.count(Object) - known
-    return new > max(ALL_ANEW_FROM, ALL_ANEW_SHARE * known)
-
-
-def _new_in_view(context: CycleContext, graph: Graph, config: Config) -> list[str]:
-    """The objects in view that are in no sub-map, and were seen often enough to be there."""
-    names = sorted(object_id(percept.label) for percept in context.percepts.objects)
-
-    new = []
-    for node in nodes_of(graph, Object, names):
-        is_sure = node.surveyed or node.sightings >= MIN_SIGHTINGS
-        if is_sure and _is_new(node, graph):
-            new.append(node.id)
-
-    return new
-
-
 def _is_new(node: Object, graph: Graph) -> bool:
     sub_map = graph.links.target(node.id, LinkKind.WITHIN)
     is_in_none = sub_map is None or graph.get(Map, sub_map) is None
     return node.map == ROOT_MAP and is_in_none
 
 
-def _scope(task: Task, graph: Graph, config: Config) -> _Scope:
-    """What a task is about, and what that may change."""
+def _scope(task: Task, graph: Graph) -> _Scope:
+    """Return what a task is about, and what that may change."""
     if task.about:
         new = [node for node in nodes_of(graph, Object, task.about) if _is_new(node, graph)]
         moved = nodes_of(graph, Map, task.about)
@@ -153,7 +155,11 @@ def _sorted(scope: _Scope, graph: Graph, config: Config) -> Indices:
         return np.zeros(0, np.int64)
 
     positions_m = positions_of(scope.objects)
-    functions, kinds = _codes(scope.objects)
+    names = sorted({node.function for node in scope.objects if node.function})
+    code_of = {name: code for code, name in enumerate(names)}
+    codes = [code_of.get(node.function, NEW) for node in scope.objects]
+    functions = np.array(codes, np.int64)
+
     cell_m = graph.cell_m()
     clear_m = np.array([node.width_m / 2 + cell_m for node in scope.objects])
     boundaries = CutLinks.around(graph, positions_m)
@@ -164,7 +170,7 @@ def _sorted(scope: _Scope, graph: Graph, config: Config) -> Indices:
         functions[:first],
         boundaries,
         config,
-        kinds=kinds,
+        kinds=len(names),
         clear_m=clear_m[:first],
         labels=scope.numbers[:first],
         next_label=next_number(graph),
@@ -175,36 +181,3 @@ def _sorted(scope: _Scope, graph: Graph, config: Config) -> Indices:
     for index in range(first, len(positions_m)):
         sub_maps.add(positions_m[index], int(functions[index]), float(clear_m[index]))
     return sub_maps.labels
-
-
-def _codes(objects: list[Object]) -> tuple[Indices, int]:
-    """(n,): the functions of objects as numbers, NEW where unknown, and how many there are."""
-    names = sorted({node.function for node in objects if node.function})
-    number = {name: code for code, name in enumerate(names)}
-    codes = [number.get(node.function, NEW) for node in objects]
-    return np.array(codes, np.int64), len(names)
-
-
-def _map_nodes(scope: _Scope, numbers: Indices, graph: Graph, config: Config) -> list[Operation]:
-    """The sub-maps that are new or cover another area than before, and so have another frame."""
-    positions_m = positions_of(scope.objects)
-    written: list[Operation] = []
-    for number in np.unique(numbers).tolist():
-        extent = extent_of(positions_m[numbers == number])
-        before = graph.get(Map, map_id(number))
-        if before is None or extent.differs_from(before, MOVED_M):
-            written.append(sub_map_node(number, extent, graph))
-            if before is not None:
-                written.append(DropPlaces(map=before.id))
-
-    return written
-
-
-def _links(scope: _Scope, numbers: Indices) -> list[Operation]:
-    """The links of the objects whose sub-map is another than before."""
-    weights = {}
-    changed = np.flatnonzero(numbers != scope.numbers)
-    for index in changed.tolist():
-        weights[scope.objects[index].id] = {map_id(int(numbers[index])): 1.0}
-
-    return [Links(kind=LinkKind.WITHIN, weights=weights)] if weights else []

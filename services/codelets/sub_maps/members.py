@@ -19,7 +19,7 @@ def sub_maps_of(graph: Graph) -> list[Map]:
 
 
 def is_sub_map(node: Map) -> bool:
-    """Whether a map is a sub-map of the root map."""
+    """Return whether a map is a sub-map of the root map."""
     return node.parent == ROOT_MAP and map_number(node.id) is not None
 
 

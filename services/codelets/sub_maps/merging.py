@@ -33,7 +33,7 @@ class Merging:
 
     def scores(self, floor: float) -> Floats:
         """(p,): by how much merging a pair raises the logarithm of the probability, for each object
-        of the smaller cluster; -inf where it gains no more than `floor`.
+        of the smaller cluster; -inf if it gains no more than `floor`.
         """
         sizes = self._statistics[:, COUNT]
         smaller = sizes[self.pairs].min(axis=1)

@@ -10,8 +10,8 @@ A cluster is a sub-map. The logarithm of a partition's probability is a sum over
 
 All parameters are integrated out. To this comes a sum over pairs of neighbours:
 
-- **boundary**: a boundary between two neighbours is frequent where their clusters differ and rare
-  where they are one, as in a stochastic block model (Holland, Laskey and Leinhardt 1983);
+- **boundary**: a boundary between two neighbours is frequent if their clusters differ and rare if
+  they are one, as in a stochastic block model (Holland, Laskey and Leinhardt 1983);
 - **gap**: open ground between them, much wider than from other neighbours, is rare in a cluster.
 
 Each feature's share is multiplied by its weight, which is what one observation of it counts for:
@@ -57,7 +57,7 @@ FUNCTIONS = 8
 
 
 class Scene(NamedTuple):
-    """What is to be clustered: (n, d) sufficient statistics of objects, the (e, 2) pairs of
+    """The objects to be clustered: (n, d) sufficient statistics of objects, the (e, 2) pairs of
     neighbours, and the (e,) bonds between those.
     """
 
@@ -75,12 +75,12 @@ class Scene(NamedTuple):
         return Scene(self.rows[members], renumbered[is_inside], self.bonds[is_inside])
 
     def within(self, labels: Indices) -> Scene:
-        """The same where only objects of one cluster are neighbours."""
+        """The same if only objects of one cluster are neighbours."""
         is_within = labels[self.edges[:, 0]] == labels[self.edges[:, 1]]
         return Scene(self.rows, self.edges[is_within], self.bonds[is_within])
 
     def merged(self, pieces: Indices) -> Scene:
-        """The same where the objects of each piece, (n,) from 0, are one."""
+        """The same if the objects of each piece, (n,) from 0, are one."""
         ends = pieces[self.edges]
         is_between = ends[:, 0] != ends[:, 1]
         return Scene(summed(self.rows, pieces), ends[is_between], self.bonds[is_between])
@@ -90,7 +90,7 @@ def rows_of(positions_m: Floats, functions: Indices, kinds: int) -> Floats:
     """(n, 8 + kinds): the sufficient statistics of each object; those of a cluster are their sum.
 
     They are 1, x, y, xx, xy, yy, the spacing s, ss, both 0 as yet, and 1 in the column of the
-    function, which is from 0 to `kinds` - 1, or -1 where it is unknown.
+    function, which is from 0 to `kinds` - 1, or -1 if it is unknown.
     """
     x_m, y_m = positions_m.T
     rows = np.zeros((len(positions_m), FUNCTIONS + kinds))

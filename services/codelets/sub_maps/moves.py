@@ -37,7 +37,13 @@ def best_moves(mixture: Mixture, scene: Scene, labels: Indices, min_gain: float)
     left = mixture.log_evidence(statistics[own] - rows) - evidence[own]
 
     moves = possible._replace(gains=possible.gains + joined + left)
-    return _best_of_each(moves.select(moves.gains >= min_gain))
+    gainful = moves.select(moves.gains >= min_gain)
+
+    # Of each object the move that gains most; of equal ones, the first.
+    ordered = gainful.select(np.lexsort((-gainful.gains, gainful.objects)))
+    is_best = np.ones(len(ordered.objects), bool)
+    is_best[1:] = ordered.objects[1:] != ordered.objects[:-1]
+    return ordered.select(is_best)
 
 
 def gain_most(scene: Scene, moves: Moves) -> Moves:
@@ -56,9 +62,22 @@ def gain_most(scene: Scene, moves: Moves) -> Moves:
 
 def _by_bonds(scene: Scene, labels: Indices) -> Moves:
     """Every move of an object to a cluster of its neighbours, and what it gains by its bonds."""
+    first, second = scene.edges.T
+    is_between = labels[first] != labels[second]
+    at_border = np.zeros(len(labels), bool)
+    at_border[first[is_between]] = True
+    at_border[second[is_between]] = True
+
+    # Of each object with a neighbour in another cluster, and each cluster of its neighbours: the
+    # sum of the bonds between them.
+    ends = np.concatenate([first, second])
+    others = np.concatenate([second, first])
+    chosen = at_border[ends]
     clusters = int(labels.max(initial=-1)) + 1
-    keys, bonds = _bonds_to_clusters(scene, labels, clusters)
-    objects, targets = np.divmod(keys, max(1, clusters))
+    keys = ends[chosen] * clusters + labels[others[chosen]]
+    found, number = np.unique(keys, return_inverse=True)
+    bonds = np.bincount(number, np.concatenate([scene.bonds, scene.bonds])[chosen], len(found))
+    objects, targets = np.divmod(found, max(1, clusters))
 
     is_own = targets == labels[objects]
     own_bonds = np.zeros(len(labels))
@@ -66,34 +85,3 @@ def _by_bonds(scene: Scene, labels: Indices) -> Moves:
 
     gained = Moves(objects, targets, bonds - own_bonds[objects])
     return gained.select(~is_own)
-
-
-def _bonds_to_clusters(scene: Scene, labels: Indices, clusters: int) -> tuple[Indices, Floats]:
-    """Of each object with a neighbour in another cluster, and each cluster of its neighbours: both
-    as object * clusters + cluster, and the sum of the bonds between them.
-    """
-    first, second = scene.edges.T
-    is_between = labels[first] != labels[second]
-    at_border = np.zeros(len(labels), bool)
-    at_border[first[is_between]] = True
-    at_border[second[is_between]] = True
-
-    ends = np.concatenate([first, second])
-    others = np.concatenate([second, first])
-    bonds = np.concatenate([scene.bonds, scene.bonds])
-    chosen = at_border[ends]
-
-    keys = ends[chosen] * clusters + labels[others[chosen]]
-    found, number = np.unique(keys, return_inverse=True)
-    summed_bonds = np.bincount(number, bonds[chosen], len(found))
-    return found, np.asarray(summed_bonds, np.float64)
-
-
-def _best_of_each(moves: Moves) -> Moves:
-    """Of each object the move that gains most; of equal ones, the first."""
-    order = np.lexsort((-moves.gains, moves.objects))
-    ordered = moves.select(order)
-
-    is_best = np.ones(len(order), bool)
-    is_best[1:] = ordered.objects[1:] != ordered.objects[:-1]
-    return ordered.select(is_best)

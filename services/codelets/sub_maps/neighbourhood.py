@@ -14,7 +14,7 @@ MIN_SPACING = 0.01
 
 
 class Separation(Protocol):
-    """What separates objects: boundaries as lines, or links that are cut."""
+    """Separates objects: boundaries as lines, or links that are cut."""
 
     def are_crossed(self, lines_m: Floats, clear_m: Floats | None = None) -> Booleans:
         """(k,): whether a boundary is across each of (k, 2, 2) lines, farther than `clear_m` from
@@ -28,7 +28,7 @@ class Neighbourhood:
 
     Boundaries within `clear_m`, (n,), of an object are its own. `spacings`, (n,), are logarithms of
     the distance of an object to its neighbours over `unit_m`: of those on the same side of
-    boundaries, or of the others where it has none. It is the harmonic mean, on which a neighbour
+    boundaries, or of the others if it has none. It is the harmonic mean, on which a neighbour
     far away has little influence.
     """
 

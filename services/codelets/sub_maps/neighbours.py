@@ -1,4 +1,4 @@
-"""Which objects are neighbours: the Gabriel graph. Two are where no other lies inside the circle
+"""Which objects are neighbours: the Gabriel graph. Two are if no other lies inside the circle
 over the line between them.
 """
 
@@ -27,7 +27,12 @@ def neighbours(positions_m: Floats) -> Indices:
     for start in range(0, count, CHUNK):
         rows = np.arange(start, min(start + CHUNK, count))
         _, found = tree.query(positions_m[rows], nearest + 1)
-        near = _without_self(found, rows)
+
+        # Each row's nearest without the object itself; if others at the same place have displaced
+        # it, without the last.
+        is_other = found != rows[:, None]
+        is_other[is_other.all(axis=1), -1] = False
+        near = found[is_other].reshape(len(rows), -1)
         is_neighbour = _is_neighbour(positions_m[near] - positions_m[rows, None])
         row, column = np.nonzero(is_neighbour)
         pairs.append(np.column_stack([rows[row], near[row, column]]))
@@ -62,17 +67,6 @@ def comes_between(positions_m: Floats, edges: Indices, point_m: Floats) -> Boole
     dots = x_m[first] * x_m[second] + y_m[first] * y_m[second]
     parted: Booleans = dots < 0
     return parted
-
-
-def _without_self(found: Indices, rows: Indices) -> Indices:
-    """(k, c - 1): each row's nearest objects (k, c) without the object itself; where others at the
-    same place have displaced it, without the last.
-    """
-    is_other = found != rows[:, None]
-    has_all = is_other.all(axis=1)
-    is_other[has_all, -1] = False
-    others: Indices = found[is_other].reshape(len(rows), -1)
-    return others
 
 
 def _is_neighbour(offsets_m: Floats) -> Booleans:

@@ -22,7 +22,7 @@ MIN_GAIN = 1e-6
 
 def partition(mixture: Mixture, scene: Scene, labels: Indices | None = None) -> Indices:
     """(n,): the labels of the clusters of a probable partition, from 0, found from `labels`, or
-    where there are none from every object for itself.
+    if there are none from every object for itself.
     """
     if labels is None:
         labels = np.arange(len(scene.rows))
@@ -50,7 +50,7 @@ def merge_clusters(mixture: Mixture, scene: Scene, labels: Indices, at_least: in
     """Merge neighbouring clusters as long as that raises the probability; with `at_least`, as long
     as there are more clusters than that, whatever it does to the probability.
 
-    In each round two clusters merge where each gains most with the other. A gain is counted by the
+    In each round two clusters merge if each gains most with the other. A gain is counted by the
     objects of the smaller one: otherwise the largest would take all.
     """
     merging = Merging(mixture, scene, labels)
@@ -129,7 +129,7 @@ def move_pieces(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
 
 
 def part_clusters(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
-    """Part each cluster in two or more where that raises the probability."""
+    """Part each cluster in two or more if that raises the probability."""
     labels = labels.copy()
     clusters = int(labels.max(initial=-1)) + 1
     for cluster in range(clusters):
@@ -142,7 +142,7 @@ def part_clusters(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
 
 
 def parts(mixture: Mixture, scene: Scene) -> Indices:
-    """(n,): in which part of one cluster each of its objects is better, from 0; 0 of all where the
+    """(n,): in which part of one cluster each of its objects is better, from 0; 0 of all if the
     cluster is best as it is.
 
     It may have as many parts as there are when no two gain by merging, or two.

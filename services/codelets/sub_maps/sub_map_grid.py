@@ -13,7 +13,7 @@ from cogmap.graph.window import Extent
 from cogmap.schemas.graph import Operation
 from cogmap.schemas.nodes import ROOT_MAP, Map
 from cogmap.services.codelets.cells import changed_cells
-from cogmap.services.codelets.sub_maps.extents import COARSEST
+from cogmap.services.codelets.sub_maps.areas import COARSEST
 from cogmap.services.codelets.sub_maps.members import is_sub_map, pose_of, sub_maps_of
 from cogmap.services.codelets.sub_maps.resampling import COLUMNS, Grid, cells_below, resampled
 
@@ -34,7 +34,7 @@ def with_places(graph: Graph, cycle: int) -> list[Map]:
 
 
 def any_with_places(graph: Graph, cycle: int) -> bool:
-    """Whether any sub-map has place nodes in a cycle, found without visiting all."""
+    """Return whether any sub-map has place nodes in a cycle, found without visiting all."""
     root_cell_m = graph.cell_m()
     return any(
         is_sub_map(node) and _has_places(node, root_cell_m, cycle) for node in graph.of_kind(Map)
@@ -63,7 +63,7 @@ def cells_around(node: Map, position_m: Floats, reach_m: float) -> Extent:
 
 
 def block_count(node: Map, graph: Graph) -> int:
-    """How many blocks cover the area of a sub-map."""
+    """Return how many blocks cover the area of a sub-map."""
     columns, rows = _blocks(node, graph)
     return columns * rows
 
@@ -100,7 +100,7 @@ def _block_side(node: Map, graph: Graph) -> int:
 
 
 def _blocks(node: Map, graph: Graph) -> tuple[int, int]:
-    """How many blocks stand side by side in each direction."""
+    """Return how many blocks stand side by side in each direction."""
     side = _block_side(node, graph)
     width, height = area_of(node).shape
     return math.ceil(width / side), math.ceil(height / side)

@@ -37,7 +37,7 @@ NEW_TURNS = 8
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """One task every EVERY_CYCLES, where sub-maps have settled."""
+    """Return one task every EVERY_CYCLES, if sub-maps have settled."""
     # Coarse maps have their turn in other cycles: a worker that is long at work gets no more.
     is_time = context.cycle % EVERY_CYCLES == EVERY_CYCLES // 3
     if graph.agent is None or not is_time or not any_with_places(graph, context.cycle):

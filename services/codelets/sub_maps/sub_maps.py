@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy.optimize import linear_sum_assignment
 
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.services.codelets.sub_maps.config import Config
-from cogmap.services.codelets.sub_maps.labels import NEW, kept_labels
 from cogmap.services.codelets.sub_maps.mixture import (
     SPACING_SQUARES,
     SPACING_SUM,
@@ -26,17 +26,21 @@ from cogmap.services.codelets.sub_maps.search import (
     parts,
 )
 
+# A sub-map is parted, or sorted anew with its neighbours, each time that it has grown by a factor;
+# more objects than these are sorted anew more seldom, and not parted.
 PARTING_GROWTH = 1.25
 REVIEW_GROWTH = 1.6
-MANY = 600
-MANY_TO_PART = 150
-MANY_REVIEW_GROWTH = REVIEW_GROWTH**2
+MAX_REVIEWED = 600
+RARE_REVIEW_GROWTH = REVIEW_GROWTH**2
+MAX_PARTED = 150
+# The label of objects that are in no sub-map yet.
+NEW = -1
 
 
 class SubMaps:
     """Objects, and the labels of their sub-maps, (n,), which are kept as long as a sub-map exists.
 
-    Positions are (n, 2); functions (n,), from 0 to `kinds` - 1, or -1 where unknown; `boundaries`
+    Positions are (n, 2); functions (n,), from 0 to `kinds` - 1, or -1 if unknown; `boundaries`
     are what separates objects. A boundary within `clear_m`, (n,), of an object is of the object
     itself and separates nothing. Objects labelled NEW are in none yet.
     """
@@ -82,7 +86,12 @@ class SubMaps:
         """The label of one more object, at (2,). Sub-maps near it may merge, part or exchange
         objects.
         """
-        near = self._append(position_m, function, clear_m)
+        near = self._near.append(position_m, clear_m)
+        row = self._rows_of(position_m[None], np.array([function]))
+        self._rows = np.vstack([self._rows, row])
+        self._set_spacings()
+        self.labels = np.append(self.labels, NEW)
+
         is_member = np.isin(self.labels, np.unique(self.labels[near])) & (self.labels != NEW)
         is_member[-1] = True
         members = np.flatnonzero(is_member)
@@ -101,49 +110,27 @@ class SubMaps:
         """Sort anew, or part, a sub-map that has grown by its last object: the more seldom the
         larger it is, so that this costs little for each object.
         """
-        size = int((self.labels == label).sum())
+        is_own = self.labels == label
+        size = int(is_own.sum())
         if _has_grown(size, REVIEW_GROWTH):
-            members = self._around(label)
-            if len(members) <= MANY or _has_grown(size, MANY_REVIEW_GROWTH):
-                self._review(members)
+            edges = self._near.edges
+            beside = edges[is_own[edges[:, 0]] | is_own[edges[:, 1]]]
+            is_around = np.isin(self.labels, np.unique(self.labels[beside])) | is_own
+            members = np.flatnonzero(is_around)
+            if len(members) <= MAX_REVIEWED or _has_grown(size, RARE_REVIEW_GROWTH):
+                found = partition(self._mixture, self._scene(members), self.labels[members])
+                self._relabel(members, found)
                 return
 
-        if size <= MANY_TO_PART and _has_grown(size, PARTING_GROWTH):
-            self._part(label)
-
-    def _part(self, label: int) -> None:
-        """Part a sub-map where that is more probable."""
-        members = np.flatnonzero(self.labels == label)
-        self._relabel(members, parts(self._mixture, self._scene(members)))
-
-    def _around(self, label: int) -> Indices:
-        """(m,): the objects of a sub-map and of those that neighbour it."""
-        is_own = self.labels == label
-        edges = self._near.edges
-        beside = edges[is_own[edges[:, 0]] | is_own[edges[:, 1]]]
-        labels = np.unique(self.labels[beside])
-        return np.flatnonzero(np.isin(self.labels, labels) | is_own)
-
-    def _review(self, members: Indices) -> None:
-        """Sort some objects, (m,), anew, from the labels that they have."""
-        found = partition(self._mixture, self._scene(members), self.labels[members])
-        self._relabel(members, found)
+        if size <= MAX_PARTED and _has_grown(size, PARTING_GROWTH):
+            members = np.flatnonzero(is_own)
+            self._relabel(members, parts(self._mixture, self._scene(members)))
 
     def _relabel(self, members: Indices, clusters: Indices) -> None:
-        """Give the clusters of some objects, (m,), the labels that they had, where they had any."""
+        """Give the clusters of some objects, (m,), the labels that they had, if they had any."""
         labels = kept_labels(self.labels[members], clusters, self.next_label)
         self.labels[members] = labels
         self.next_label = max(self.next_label, int(labels.max(initial=NEW)) + 1)
-
-    def _append(self, position_m: Floats, function: int, clear_m: float) -> Indices:
-        """Add an object that is in no sub-map; its neighbours."""
-        near = self._near.append(position_m, clear_m)
-        row = self._rows_of(position_m[None], np.array([function]))
-        self._rows = np.vstack([self._rows, row])
-        self._set_spacings()
-
-        self.labels = np.append(self.labels, NEW)
-        return near
 
     def _rows_of(self, positions_m: Floats, functions: Indices) -> Floats:
         return rows_of(positions_m - self._centre_m, functions, self._kinds)
@@ -154,7 +141,7 @@ class SubMaps:
         self._rows[:, SPACING_SQUARES] = spacings**2
 
     def _scene(self, members: Indices) -> Scene:
-        """What is to be clustered of some objects, (m,)."""
+        """Return what is to be clustered of some objects, (m,)."""
         count = len(self._rows)
         number = np.full(count, -1)
         number[members] = np.arange(len(members))
@@ -166,9 +153,38 @@ class SubMaps:
 
 
 def _has_grown(size: int, growth: float) -> bool:
-    """Whether the last of so many objects completes another growth by a factor, since the first."""
+    """Return whether the last of so many objects completes another growth by a factor, since the
+    first.
+    """
     if size < 2:
         return False
 
     step = math.log(growth)
     return math.floor(math.log(size) / step) > math.floor(math.log(size - 1) / step)
+
+
+def kept_labels(before: Indices, after: Indices, next_label: int) -> Indices:
+    """(n,): the partition `after` with the labels of `before`, NEW of objects that had none.
+
+    Each cluster keeps the label of the one that it shares most objects with; of several that claim
+    one label, and of several labels for one cluster, the most objects in all decide. Clusters that
+    are left over get new labels from `next_label`, in the order of their first objects.
+    """
+    names, number = np.unique(after, return_inverse=True)
+    had_label = before != NEW
+    old_names, old_number = np.unique(before[had_label], return_inverse=True)
+
+    shared = np.zeros((len(names), len(old_names)))
+    np.add.at(shared, (number[had_label], old_number), 1.0)
+    clusters, olds = linear_sum_assignment(shared, maximize=True)
+    is_shared = shared[clusters, olds] > 0
+
+    labels = np.full(len(names), NEW)
+    labels[clusters[is_shared]] = old_names[olds[is_shared]]
+
+    _, first = np.unique(after, return_index=True)
+    fresh = np.flatnonzero(labels == NEW)
+    fresh = fresh[np.argsort(first[fresh])]
+    labels[fresh] = next_label + np.arange(len(fresh))
+    kept: Indices = labels[number]
+    return kept

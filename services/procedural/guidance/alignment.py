@@ -9,6 +9,9 @@ import cmath
 from collections.abc import Sequence
 from typing import NamedTuple
 
+import numpy as np
+
+from cogmap.estimation.alignment import motion_onto
 from cogmap.schemas.cognition import Relation
 
 NEAR_SD_M = 0.3
@@ -101,15 +104,9 @@ def _misfit(pair: Pair, motion: Motion) -> float:
 
 
 def _least_squares(pairs: Sequence[Pair]) -> Motion:
-    """The best weighted rotation and shift (Procrustes), with a prior for a small rotation."""
-    weights = [pair.sd_m**-2 for pair in pairs]
-    total = sum(weights)
-    then_m = sum(weight * pair.then_m for weight, pair in zip(weights, pairs, strict=True)) / total
-    now_m = sum(weight * pair.now_m for weight, pair in zip(weights, pairs, strict=True)) / total
-
-    correlation = complex(PRIOR_SD_RAD**-2)
-    for weight, pair in zip(weights, pairs, strict=True):
-        correlation += weight * (pair.then_m - then_m).conjugate() * (pair.now_m - now_m)
-
-    rotation = correlation / abs(correlation)
-    return Motion(rotation, now_m - rotation * then_m)
+    """The best weighted rotation and shift, with a prior for a small rotation."""
+    then_m = np.array([(pair.then_m.real, pair.then_m.imag) for pair in pairs])
+    now_m = np.array([(pair.now_m.real, pair.now_m.imag) for pair in pairs])
+    weights = np.array([pair.sd_m**-2 for pair in pairs])
+    x_m, y_m, turn_rad = motion_onto(then_m, now_m, weights, PRIOR_SD_RAD**-2).tolist()
+    return Motion(cmath.rect(1.0, turn_rad), complex(x_m, y_m))

@@ -16,6 +16,7 @@ from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import (
     PLAN_ID,
     ROOT_MAP,
+    CostLayer,
     Episode,
     Goal,
     GraphNode,
@@ -46,7 +47,17 @@ NODES: list[tuple[GraphNode, str]] = [
     ),
     (
         Plan(id=PLAN_ID, state=PlanState.READY, explores=True, doubtful=True, length_m=9.0),
-        "the plan to explore, 9 m, over doubtful road",
+        "the plan to explore, 9 m, over road that was blocked",
+    ),
+    (
+        Plan(
+            id=PLAN_ID,
+            state=PlanState.READY,
+            goals=[goal_id("bakery")],
+            length_m=210.0,
+            detour_for={CostLayer.BESIDE: 12.0, CostLayer.OBSTACLE: 998.0},
+        ),
+        "the plan to go to bakery, 210 m; the route before is dearer now: something stands on it",
     ),
     (Plan(id=PLAN_ID, state=PlanState.NO_ROUTE), "the plan: no route leads to the goal"),
     (Map(id=ROOT_MAP, cell_m=1.0), "the root map"),

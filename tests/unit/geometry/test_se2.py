@@ -77,9 +77,3 @@ def test_the_mean_of_poses_has_the_mean_position_and_direction() -> None:
     mean = se2.mean_pose(poses)
 
     assert mean == pytest.approx([1.0, 3.0, np.pi])
-
-
-def test_points_are_moved_onto_others_by_the_pose_that_moved_those() -> None:
-    moved = se2.transform_from(POSES[0], POINTS)
-
-    assert se2.motion_onto(POINTS, moved) == pytest.approx(POSES[0])

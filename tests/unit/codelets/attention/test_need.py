@@ -33,7 +33,7 @@ def _need(level: float, salience: float = 0.0) -> Need:
     )
 
 
-@pytest.mark.parametrize(("level", "number"), [(0.0, 0), (0.49, 0), (0.5, 1), (1.0, 1)])
+@pytest.mark.parametrize(("level", "number"), [(0.0, 0), (0.39, 0), (0.4, 1), (1.0, 1)])
 def test_a_need_is_brought_from_the_level_on_at_which_it_is_high(level: float, number: int) -> None:
     assert len(_found(_need(level))) == number
 

@@ -8,8 +8,9 @@ import msgspec
 import numpy as np
 import pytest
 
+from cogmap.estimation.alignment import motion_onto
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import motion_onto, relative
+from cogmap.geometry.se2 import relative
 from cogmap.graph.path import rows_of
 from cogmap.runtime.run import REAL_TIME
 from cogmap.schemas.graph import Phase

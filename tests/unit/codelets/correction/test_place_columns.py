@@ -15,8 +15,9 @@ from cogmap.graph.window import EVIDENCE_COLUMNS, WEIGHT_COLUMNS
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.graph import Cells
 from cogmap.schemas.nodes import CORRECTION_ID, ROOT_MAP, Correction, Map, PlaceColumn
+from cogmap.services.codelets.cells import MAX_CELLS
 from cogmap.services.codelets.config import Config
-from cogmap.services.codelets.correction.place_columns import MAX_CELLS, move_places
+from cogmap.services.codelets.correction.place_columns import move_places
 from cogmap.services.codelets.mapping.evidence import weights_of
 from cogmap.testing import graph_of, task
 from tests.support.world.scenes import run

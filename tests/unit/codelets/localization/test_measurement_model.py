@@ -10,10 +10,10 @@ import pytest
 from cogmap.schemas.nodes import NEVER_NS
 from cogmap.services.codelets.localization.information import new_share, variances_at
 from cogmap.services.codelets.localization.measurement_model import (
-    Sighting,
+    Measurements,
     compare,
     log_likelihood,
-    sightings,
+    measurements,
 )
 from cogmap.services.codelets.mapping.path import segments
 from cogmap.testing import graph_of, landmark, percept
@@ -29,13 +29,13 @@ def _agent() -> np.ndarray:
     return samples
 
 
-def _seen() -> Sighting:
+def _seen() -> Measurements:
     """A house ten metres ahead."""
     rng = np.random.default_rng(1)
     where_m = rng.normal((RANGE_M, 0.0), 0.1, (200, 2))
     graph = graph_of(landmark("house", where_m, sightings=5))
 
-    found = sightings([percept("house")], graph, 4.0, NEVER_NS)
+    found = measurements([percept("house")], graph, 4.0, NEVER_NS)
     assert found is not None
     return found
 

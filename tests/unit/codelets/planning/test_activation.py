@@ -1,103 +1,133 @@
 """Routes by spreading activation."""
 
+from __future__ import annotations
+
+import math
+
 import numpy as np
 import pytest
+from scipy import sparse
+from scipy.sparse.csgraph import dijkstra
 
-from cogmap.services.codelets.planning.activation import (
-    NoRoute,
-    NoRouteReason,
-    Route,
-    climb,
-    find_route,
-    spread,
+from cogmap.geometry.arrays import Booleans, Indices
+from cogmap.graph.window import LINK_OFFSETS
+from cogmap.services.codelets.planning.activation import spread
+from cogmap.services.codelets.planning.network import (
+    Cell,
+    PlaceNetwork,
+    grid_network,
+    place_network,
 )
-from cogmap.services.codelets.planning.network import grid_network
+from cogmap.services.codelets.planning.route_plan import cost_m
 
 
-def open_grid(width=6, height=5, **settings):
-    return grid_network(np.ones((width, height), bool), **settings)
+def _open_grid(origin: Cell = (0, 0), cell_m: float = 1.0) -> PlaceNetwork:
+    return grid_network(np.ones((6, 5), bool), cell_m, origin)
 
 
-def with_wall(column=3, gap=None):
+def _wall(gap: int | None = None) -> Booleans:
     free = np.ones((7, 6), bool)
-    free[column] = False
+    free[3] = False
     if gap is not None:
-        free[column, gap] = True
+        free[3, gap] = True
     return free
 
 
-def test_distance_is_octile_on_a_free_grid():
-    field = spread(open_grid(), np.array([[0, 0]]))
+def _route(network: PlaceNetwork, start: Cell, goal: Cell) -> Indices:
+    route = spread(network, np.array([goal])).climb(start)
+    assert route is not None
+    return route
+
+
+def test_distance_is_octile_on_a_free_grid() -> None:
+    field = spread(_open_grid(), np.array([[0, 0]]))
 
     assert field.distance_m[3, 1] == pytest.approx(2 + np.sqrt(2), abs=1e-5)
     assert field.activation[0, 0] == 1
 
 
-def test_the_nearest_of_several_goals_is_what_a_node_is_activated_by():
-    field = spread(open_grid(), np.array([[0, 0], [5, 4]]))
+def test_the_nearest_of_several_goals_is_what_a_node_is_activated_by() -> None:
+    field = spread(_open_grid(), np.array([[0, 0], [5, 4]]))
 
     assert field.distance_m[4, 4] == pytest.approx(1)
 
 
-def test_a_route_leads_through_the_gap_of_a_wall_without_cutting_its_corners():
-    network = grid_network(with_wall(gap=5))
+def test_a_route_leads_through_the_gap_of_a_wall_without_cutting_its_corners() -> None:
+    network = grid_network(_wall(gap=5))
+    route = _route(network, (2, 4), (4, 4))
 
-    route = find_route(network, (2, 4), (4, 4))
-
-    assert isinstance(route, Route)
-    assert route.cells.tolist() == [[2, 4], [2, 5], [3, 5], [4, 5], [4, 4]]
-    assert route.length_m == pytest.approx(4)
+    assert route.tolist() == [[2, 4], [2, 5], [3, 5], [4, 5], [4, 4]]
+    assert cost_m(network, route) == pytest.approx(4)
 
 
-def test_a_link_of_low_weight_is_avoided():
-    network = open_grid()
-    network.weights[:, 2, 0] = 0.1
+def test_a_dear_place_is_avoided() -> None:
+    cost = np.ones((6, 5))
+    cost[2, 0] = 10.0
 
-    route = find_route(network, (0, 0), (4, 0))
-
-    assert isinstance(route, Route)
-    assert [2, 0] not in route.cells.tolist()
+    assert [2, 0] not in _route(place_network(cost), (0, 0), (4, 0)).tolist()
 
 
-def test_cells_are_those_of_the_map_wherever_the_network_begins():
-    network = open_grid(origin=(-10, 20), cell_m=0.5)
+def test_a_blocked_place_is_crossed_at_no_cost() -> None:
+    cost = np.ones((6, 5))
+    cost[2] = np.inf
 
-    route = find_route(network, (-10, 20), (-7, 20))
-
-    assert isinstance(route, Route)
-    assert route.cells.tolist() == [[-10, 20], [-9, 20], [-8, 20], [-7, 20]]
-    assert route.length_m == pytest.approx(1.5)
+    assert spread(place_network(cost), np.array([[0, 0]])).climb((4, 0)) is None
 
 
-def test_links_that_lead_out_of_the_network_are_ignored():
-    network = open_grid()
+def test_cells_are_those_of_the_map_wherever_the_network_begins() -> None:
+    route = _route(_open_grid((-10, 20), 0.5), (-10, 20), (-7, 20))
+
+    assert route.tolist() == [[-10, 20], [-9, 20], [-8, 20], [-7, 20]]
+
+
+def test_links_that_lead_out_of_the_network_are_ignored() -> None:
+    network = _open_grid()
     network.weights[:] = 1
+    field = spread(network, np.array([[0, 4]]))
 
-    route = find_route(network, (5, 0), (0, 4))
-
-    assert isinstance(route, Route)
-    assert route.length_m == pytest.approx(1 + 4 * np.sqrt(2), abs=1e-5)
+    assert field.distance_m[5, 0] == pytest.approx(1 + 4 * np.sqrt(2), abs=1e-5)
 
 
-def test_no_activation_arrives_behind_a_wall_so_there_is_no_climb():
-    network = grid_network(with_wall())
-    field = spread(network, np.array([[0, 0]]))
+@pytest.mark.parametrize("start", [(5, 5), (3, 2), (-1, 0)], ids=["behind", "blocked", "outside"])
+def test_no_activation_arrives_behind_a_wall_on_it_or_outside(start: Cell) -> None:
+    field = spread(grid_network(_wall()), np.array([[0, 0]]))
 
-    assert climb(network, field, (5, 5)) is None
+    assert not field.arrives(start)
+    assert field.climb(start) is None
 
 
-@pytest.mark.parametrize(
-    ("start", "goal", "reason"),
-    [
-        ((-1, 0), (0, 0), NoRouteReason.START_OUTSIDE),
-        ((0, 0), (7, 0), NoRouteReason.GOAL_OUTSIDE),
-        ((3, 2), (0, 0), NoRouteReason.START_BLOCKED),
-        ((0, 0), (3, 2), NoRouteReason.GOAL_BLOCKED),
-        ((1, 1), (1, 1), NoRouteReason.AT_GOAL),
-        ((1, 1), (5, 1), NoRouteReason.NOT_CONNECTED),
-    ],
-)
-def test_why_there_is_no_route_is_stated(start, goal, reason):
-    network = grid_network(with_wall())
+def test_the_agent_is_at_a_goal_that_has_no_links() -> None:
+    free = np.zeros((3, 3), bool)
+    free[1, 1] = True
 
-    assert find_route(network, start, goal) == NoRoute(reason)
+    assert _route(grid_network(free), (1, 1), (1, 1)).tolist() == [[1, 1]]
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_routes_cost_as_little_as_those_of_exact_search(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    cost = np.where(rng.random((20, 15)) < 0.25, np.inf, rng.choice([1.0, 2.0, 10.0], (20, 15)))
+    network = place_network(cost)
+    field = spread(network, np.array([[3, 3]]))
+
+    expected = dijkstra(_matrix(cost), indices=3 * 15 + 3).reshape(20, 15)
+    np.testing.assert_allclose(field.distance_m, expected, rtol=1e-5)
+    for start in np.argwhere(np.isfinite(expected)).tolist():
+        route = field.climb((start[0], start[1]))
+        assert route is not None
+        assert cost_m(network, route) == pytest.approx(expected[tuple(start)], rel=1e-5)
+
+
+def _matrix(cost: np.ndarray) -> sparse.csr_matrix:
+    """The links of places, made one by one."""
+    width, height = cost.shape
+    links = sparse.lil_matrix((cost.size, cost.size))
+    for i, j in np.argwhere(np.isfinite(cost)).tolist():
+        for di, dj in [*LINK_OFFSETS.tolist(), *(-LINK_OFFSETS).tolist()]:
+            if not (0 <= i + di < width and 0 <= j + dj < height):
+                continue
+            dearer = max(cost[i, j], cost[i + di, j + dj])
+            if np.isfinite([dearer, cost[i + di, j], cost[i, j + dj]]).all():
+                at = (i * height + j, (i + di) * height + j + dj)
+                links[at] = math.hypot(di, dj) * dearer
+    return links.tocsr()

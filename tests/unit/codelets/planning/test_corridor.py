@@ -22,8 +22,8 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.services.codelets.planning.config import Config
 from cogmap.services.codelets.planning.corridor import corridor
-from cogmap.services.codelets.planning.held import held_routes
 from cogmap.services.codelets.planning.route_plan import run
+from cogmap.services.codelets.planning.sub_map_routes import sub_map_routes
 from cogmap.services.codelets.planning.targets import goals_m
 from cogmap.services.codelets.sub_maps import coarse_places, sub_map_places
 from cogmap.services.codelets.sub_maps.sub_map_grid import SETTLED_CYCLES
@@ -32,7 +32,7 @@ from cogmap.testing import agent, graph_of, task
 SIDE = 240
 EVERY = 40
 WIDTH = 6
-ROUGH = Config(flat_places=1000)
+ROUGH = Config(search_places=1000)
 FLAT = Config()
 FAR = Goal(id=goal_id("far"), base_level=1.0, x_m=203.0, y_m=163.0)
 
@@ -77,7 +77,7 @@ def test_a_rough_route_is_nearly_as_short_as_one_over_the_whole_map() -> None:
 def test_a_corridor_holds_the_plan_and_little_else() -> None:
     graph = _city(FAR)
     assert graph.agent is not None
-    found = corridor(graph, graph.agent, goals_m(graph), ROUGH)
+    found = corridor(graph, graph.agent, goals_m(graph, graph.agent), ROUGH)
 
     assert found is not None
     plan = _plan(graph, ROUGH)
@@ -92,14 +92,14 @@ def test_there_is_no_corridor_without_a_goal_on_the_map(goals: list[Goal]) -> No
     graph = _city(*goals)
     assert graph.agent is not None
 
-    assert corridor(graph, graph.agent, goals_m(graph), ROUGH) is None
+    assert corridor(graph, graph.agent, goals_m(graph, graph.agent), ROUGH) is None
 
 
 def test_a_small_map_is_planned_on_as_a_whole() -> None:
     graph = _city(FAR)
     assert graph.agent is not None
 
-    assert corridor(graph, graph.agent, goals_m(graph), FLAT) is None
+    assert corridor(graph, graph.agent, goals_m(graph, graph.agent), FLAT) is None
 
 
 def test_several_goals_are_ordered_and_the_first_is_driven_to() -> None:
@@ -169,10 +169,10 @@ def _from_to(graph: Graph, start_m: tuple[float, float], goal_m: tuple[float, fl
 def test_a_route_within_a_sub_map_is_found_on_its_grid(heading_rad: float) -> None:
     ends = (83.0, 110.0), (140.0, 123.0)
     graph = _from_to(_quarter(_city(), heading_rad), *ends)
-    held = held_routes(graph, np.array(ends), ROUGH)
+    held = sub_map_routes(graph, np.array(ends), ROUGH)
     assert held is not None
     assert graph.agent is not None
-    found = corridor(graph, graph.agent, goals_m(graph), ROUGH)
+    found = corridor(graph, graph.agent, goals_m(graph, graph.agent), ROUGH)
     assert found is not None
 
     cells = np.rint(held.passed_m).astype(int) - found.extent.lower
@@ -187,7 +187,7 @@ def test_a_sub_map_does_without_the_coarse_maps() -> None:
         graph.change([DropNode(id=name)])
     assert graph.agent is not None
 
-    assert corridor(graph, graph.agent, goals_m(graph), ROUGH) is not None
+    assert corridor(graph, graph.agent, goals_m(graph, graph.agent), ROUGH) is not None
 
 
 @pytest.mark.parametrize(
@@ -202,10 +202,10 @@ def test_where_a_route_may_lead_outside_a_sub_map_the_coarse_maps_are_searched(
     start_m: tuple[float, float], goal_m: tuple[float, float]
 ) -> None:
     graph = _from_to(_quarter(_city()), start_m, goal_m)
-    assert held_routes(graph, np.array([start_m, goal_m]), ROUGH) is None
+    assert sub_map_routes(graph, np.array([start_m, goal_m]), ROUGH) is None
 
     assert graph.agent is not None
-    assert corridor(graph, graph.agent, goals_m(graph), ROUGH) is not None
+    assert corridor(graph, graph.agent, goals_m(graph, graph.agent), ROUGH) is not None
 
 
 def test_a_sub_map_of_which_no_place_is_known_yet_is_not_planned_on() -> None:
@@ -213,4 +213,4 @@ def test_a_sub_map_of_which_no_place_is_known_yet_is_not_planned_on() -> None:
     graph = _quarter(_city())
     graph.change([DropPlaces(map=map_id(1))])
 
-    assert held_routes(graph, np.array(ends), ROUGH) is None
+    assert sub_map_routes(graph, np.array(ends), ROUGH) is None

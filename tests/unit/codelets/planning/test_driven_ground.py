@@ -10,7 +10,7 @@ from cogmap.graph.window import WEIGHT_COLUMNS
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.nodes import ROOT_MAP, Map, PathColumn, PathSegment, PlaceColumn, segment_id
 from cogmap.services.codelets.planning.config import Config
-from cogmap.services.codelets.planning.ground import Ground, ground
+from cogmap.services.codelets.planning.place_cost import PlaceCosts, place_costs
 from cogmap.testing import agent
 from tests.support.world.street_loop import block_of
 
@@ -32,13 +32,13 @@ def _driven_street() -> Graph:
     return graph
 
 
-def _ground(graph: Graph) -> Ground:
+def _ground(graph: Graph) -> PlaceCosts:
     assert graph.agent is not None
-    return ground(graph, graph.agent, Config())
+    return place_costs(graph, graph.agent, Config())
 
 
-def _is_free(around: Ground, i: int, j: int) -> bool:
-    return bool(around.is_free[around.network.index_of((i, j))])
+def _is_free(around: PlaceCosts, i: int, j: int) -> bool:
+    return bool(around.is_free[tuple(np.array((i, j)) - around.grid.origin)])
 
 
 def test_what_the_agent_drove_over_is_free_though_an_edge_is_mapped_across_it() -> None:

@@ -79,3 +79,19 @@ def test_other_goals_are_next_once_the_need_is_satisfied() -> None:
 
     assert after.state is PlanState.READY
     assert after.goals == [far.id]
+
+
+def test_of_several_places_that_satisfy_a_need_it_goes_to_the_one_with_the_shortest_route() -> None:
+    across = Object(
+        id=object_id("charging-place~2"),
+        label="charging-place",
+        function="charge",
+        x_m=3.0,
+        y_m=20.0,
+    )
+    graph = town(0.7, 40.0, across)
+    found = plan(graph)
+
+    assert found.goals == [CHARGING]
+    assert found.route is not None
+    assert found.route.numpy()[-1].tolist() == [3.0, 20.0]

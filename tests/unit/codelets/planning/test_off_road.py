@@ -24,7 +24,7 @@ from cogmap.schemas.nodes import (
     segment_id,
 )
 from cogmap.services.codelets.planning.config import Config
-from cogmap.services.codelets.planning.ground import ground
+from cogmap.services.codelets.planning.place_cost import place_costs
 from cogmap.services.codelets.planning.route_plan import run
 from cogmap.testing import agent
 from tests.support.world.street_loop import block_of
@@ -102,9 +102,9 @@ def test_ground_too_near_for_the_camera_is_known_where_the_agent_starts() -> Non
     graph.change([Map(id=ROOT_MAP, cell_m=1.0), here])
     graph.change([block_of(PlaceColumn.ROAD, range(-3, 4), range(-20, -10), 1.0)])
 
-    around = ground(graph, here, Config())
+    around = place_costs(graph, here, Config())
 
-    i, j = around.network.index_of((0, 4))
+    i, j = np.array((0, 4)) - around.grid.origin
     assert around.is_known[i, j]
 
 
@@ -118,7 +118,7 @@ def test_ground_too_near_for_the_camera_is_known_where_road_begins_behind_it(
     for j in (range(-20, -10), range(road_from_j, 60)):
         graph.change([block_of(PlaceColumn.ROAD, range(-3, 4), j, 1.0)])
 
-    around = ground(graph, here, Config())
+    around = place_costs(graph, here, Config())
 
-    i, j = around.network.index_of((0, 4))
+    i, j = np.array((0, 4)) - around.grid.origin
     assert bool(around.is_known[i, j]) is is_known

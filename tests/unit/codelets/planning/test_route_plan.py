@@ -14,6 +14,7 @@ from cogmap.schemas.cognition import Direction, RouteReplay
 from cogmap.schemas.graph import DropNode
 from cogmap.schemas.nodes import (
     NEVER_NS,
+    CostLayer,
     Goal,
     LinkKind,
     Object,
@@ -27,7 +28,7 @@ from cogmap.services.codelets.planning.config import Config
 from cogmap.services.codelets.planning.route_plan import due
 from cogmap.testing import agent, percepts
 from tests.support.world.route_planning import STAMP_NS, answered, goal_at, planned
-from tests.support.world.street_loop import barrier, cells_of, loop
+from tests.support.world.street_loop import barrier, block_of, cells_of, loop
 
 
 def _routes(answer: Answer) -> list[RouteReplay]:
@@ -62,7 +63,9 @@ def test_where_a_street_is_closed_the_plan_takes_the_other() -> None:
     graph.change([barrier(20, 0)])
     after = planned(graph)
 
+    assert before.detour_for == {}
     assert after.length_m > before.length_m + 60.0
+    assert max(after.detour_for, key=after.detour_for.__getitem__) is CostLayer.OBSTACLE
     assert after.route is not None
     assert after.route.numpy()[:, 1].max() > 35.0
 
@@ -89,15 +92,6 @@ def test_a_goal_without_a_route_is_in_the_plan_with_the_reason(
 
     assert plan.unreachable == {goal.id: state}
     assert plan.goals == [goal_id("near")]
-
-
-def test_a_goal_behind_closed_streets_has_no_route() -> None:
-    goal = msgspec.structs.replace(goal_at("far", 40.0, 40.0), doubts=Config().max_doubts)
-    graph = loop(goal, barrier(20, 0), barrier(20, 40))
-    plan = planned(graph)
-
-    assert plan.state is PlanState.NO_ROUTE
-    assert plan.unreachable == {goal_id("far"): PlanState.NO_ROUTE}
 
 
 def test_an_object_is_reached_from_the_street_beside_it() -> None:
@@ -260,3 +254,19 @@ def test_a_goal_that_is_forgotten_is_no_longer_in_the_plan() -> None:
 
     assert plan.goals == []
     assert plan.planned_ns > NEVER_NS
+
+
+def test_a_gap_narrower_than_the_robot_is_no_way() -> None:
+    gap = block_of(PlaceColumn.OBSTACLE, range(20, 21), range(1, 2), 0.0)
+    plan = planned(loop(goal_at("far", 40.0, 0.0), barrier(20, 0), gap))
+
+    assert plan.route is not None
+    assert plan.route.numpy()[:, 1].max() > 35.0
+
+
+def test_a_gap_as_wide_as_the_robot_is_passed() -> None:
+    gap = block_of(PlaceColumn.OBSTACLE, range(20, 21), range(0, 2), 0.0)
+    plan = planned(loop(goal_at("far", 40.0, 0.0), barrier(20, 0), gap))
+
+    assert plan.route is not None
+    assert plan.route.numpy()[:, 1].max() <= 3.0

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from cogmap.services.codelets.sub_maps.labels import NEW, kept_labels
+from cogmap.services.codelets.sub_maps.sub_maps import NEW, kept_labels
 
 
 def kept(before, after, next_label=10):

@@ -10,9 +10,8 @@ import pytest
 from cogmap.geometry.arrays import Singles
 from cogmap.graph.window import CUT_BELOW, WEIGHT_COLUMNS, Extent, Window
 from cogmap.schemas.nodes import PlaceColumn
+from cogmap.services.codelets.planning.activation import spread
 from cogmap.services.codelets.planning.network import PlaceNetwork
-from cogmap.services.codelets.planning.search.flat import FlatPlanner
-from cogmap.services.codelets.planning.search.route import Route
 from cogmap.services.codelets.sub_maps.resampling import COLUMNS, Grid, cells_below, resampled
 
 HALF = 70
@@ -58,7 +57,7 @@ def _is_connected(root: Window, grid: Grid, start: tuple[int, int], goal: tuple[
     places = resampled(root, grid, AREA)
     open_links = np.where(places[WEIGHTS] >= CUT_BELOW, 1.0, 0.0).astype(np.float32)
     network = PlaceNetwork(AREA.lower, 1.0, open_links)
-    return isinstance(FlatPlanner(network).find_route(start, goal), Route)
+    return spread(network, np.array([goal])).arrives(start)
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.3, -0.5])

@@ -1,4 +1,4 @@
-"""Whether there is anything to plan, and whether it must be planned at once."""
+"""Occasions to plan: is there anything to plan for, and must it be planned at once?"""
 
 from __future__ import annotations
 
@@ -8,14 +8,15 @@ from cogmap.graph.graph import Graph
 from cogmap.graph.window import Extent
 from cogmap.schemas.nodes import PLAN_ID, PlaceColumn, Plan, PlanState, Self
 from cogmap.services.codelets.planning.config import Config
-from cogmap.services.codelets.planning.ground import stands_there
+from cogmap.services.codelets.planning.place_cost import is_obstructed
 from cogmap.services.codelets.planning.targets import has_arrived, open_goals
 
 BLOCKED_M = 30.0
+"""Farther than obstacles are put on the map."""
 
 
 def is_done(graph: Graph, config: Config) -> bool:
-    """Whether there is nothing to plan for, and no plan that states otherwise."""
+    """Decide whether there is nothing to plan for, and no plan that states otherwise."""
     plan = graph.get(Plan, PLAN_ID)
     has_ended = plan is None or plan.state in {PlanState.NO_GOAL, PlanState.AT_GOAL}
     explores = config.explore and not has_arrived(graph)
@@ -23,8 +24,8 @@ def is_done(graph: Graph, config: Config) -> bool:
 
 
 def is_urgent(graph: Graph, agent: Self, config: Config) -> bool:
-    """Whether there is no plan, a goal is in none, or the agent is at the end of its route, or
-    something stands on it.
+    """Decide whether to plan at once: there is no plan, or a goal is not in it, or the agent is at
+    the end of its route, or something stands on that.
     """
     plan = graph.get(Plan, PLAN_ID)
     if plan is None:
@@ -42,8 +43,8 @@ def is_urgent(graph: Graph, agent: Self, config: Config) -> bool:
 
 
 def _is_blocked(plan: Plan, nearest: int, graph: Graph) -> bool:
-    """Whether something stands within BLOCKED_M ahead on a plan's route, at whose place number
-    `nearest` the agent is; not where the plan is to find out whether it does.
+    """Decide whether something stands within BLOCKED_M ahead on a plan's route, at whose place
+    number `nearest` the agent is; not if the plan is to find out whether it does.
     """
     if plan.route is None or plan.doubtful:
         return False
@@ -56,5 +57,5 @@ def _is_blocked(plan: Plan, nearest: int, graph: Graph) -> bool:
 
     around = Extent((first_i, first_j), (last_i, last_j))
     window = graph.places.window(plan.map, [PlaceColumn.OBSTACLE], around)
-    is_obstacle = stands_there(window.column(PlaceColumn.OBSTACLE))
+    is_obstacle = is_obstructed(window.column(PlaceColumn.OBSTACLE))
     return bool(is_obstacle[tuple((ahead - around.lower).T)].any())

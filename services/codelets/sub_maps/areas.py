@@ -1,4 +1,4 @@
-"""The frame, the extent and the grid of a sub-map, by where its objects are."""
+"""The frame, the area and the grid of a sub-map, by where its objects are."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ know no more than those.
 """
 
 
-class Extent(NamedTuple):
+class Area(NamedTuple):
     """The middle of a rectangle in the root map's frame, and its sides."""
 
     x_m: float
@@ -31,7 +31,7 @@ class Extent(NamedTuple):
     height_m: float
 
     def differs_from(self, node: Map, tolerance_m: float) -> bool:
-        """Whether any border of it lies elsewhere than that of a sub-map, by more than this."""
+        """Return whether any border of it lies elsewhere than a sub-map's, by more than this."""
         sides_m = (self.width_m - node.width_m) / 2, (self.height_m - node.height_m) / 2
         middle_m = self.x_m - node.x_m, self.y_m - node.y_m
         for moved_m, grown_m in zip(middle_m, sides_m, strict=True):
@@ -41,28 +41,28 @@ class Extent(NamedTuple):
         return False
 
 
-def extent_of(positions_m: Floats) -> Extent:
-    """What (n, 2) positions cover."""
+def area_covered(positions_m: Floats) -> Area:
+    """Return what (n, 2) positions cover."""
     low_m = positions_m.min(axis=0)
     high_m = positions_m.max(axis=0)
     x_m, y_m = ((low_m + high_m) / 2).tolist()
     width_m, height_m = (high_m - low_m).tolist()
-    return Extent(x_m, y_m, max(MIN_SIDE_M, width_m), max(MIN_SIDE_M, height_m))
+    return Area(x_m, y_m, max(MIN_SIDE_M, width_m), max(MIN_SIDE_M, height_m))
 
 
 def is_outdated(node: Map, members: Mapping[int, Sequence[Object]]) -> bool:
-    """Whether a sub-map has lost its objects, or they cover another area by now."""
+    """Return whether a sub-map has lost its objects, or they cover another area by now."""
     (objects,) = members.values()
     if not objects:
         return True
 
-    return extent_of(positions_of(objects)).differs_from(node, MOVED_M)
+    return area_covered(positions_of(objects)).differs_from(node, MOVED_M)
 
 
-def sub_map_node(number: int, extent: Extent, graph: Graph) -> Map:
+def sub_map_node(number: int, area: Area, graph: Graph) -> Map:
     """The node of a sub-map. The larger its area, the coarser its grid (paper §5.3)."""
     root_cell_m = graph.cell_m(ROOT_MAP)
-    area_m2 = extent.width_m * extent.height_m
+    area_m2 = area.width_m * area.height_m
     wanted_m = math.sqrt(area_m2 / PLACES)
 
     # Powers of two, so that a grid stays as it is while its sub-map grows a little.
@@ -74,8 +74,8 @@ def sub_map_node(number: int, extent: Extent, graph: Graph) -> Map:
         cycle=graph.cycle,
         cell_m=cell_m,
         parent=ROOT_MAP,
-        x_m=extent.x_m,
-        y_m=extent.y_m,
-        width_m=extent.width_m,
-        height_m=extent.height_m,
+        x_m=area.x_m,
+        y_m=area.y_m,
+        width_m=area.width_m,
+        height_m=area.height_m,
     )

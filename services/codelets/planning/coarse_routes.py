@@ -1,4 +1,4 @@
-"""Rough routes: over the places of a map that is coarser than the one to be driven on."""
+"""Routes over the places of a map that is coarser than the one to be driven on."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import ROAD_FROM, WEIGHT_COLUMNS, Extent
 from cogmap.schemas.nodes import PlaceColumn
-from cogmap.services.codelets.planning.activation import climb, spread_over
+from cogmap.services.codelets.planning.activation import Links, spread
 from cogmap.services.codelets.planning.config import Config
-from cogmap.services.codelets.planning.network import Cell, Here, PlaceNetwork, link_weights
-from cogmap.services.codelets.planning.search.links import Links
+from cogmap.services.codelets.planning.network import Cell, PlaceNetwork, uncut_links
 
 COLUMNS = (PlaceColumn.ROAD, *WEIGHT_COLUMNS)
+
 SNAP = 2
 """In cells, how far from a position the place may be from which it is reached."""
 
@@ -23,33 +23,32 @@ SNAP = 2
 class Routes(NamedTuple):
     """A rectangle of a map, and the cells of it that routes lead through, (w, h)."""
 
-    lower: tuple[int, int]
+    lower: Cell
     is_passed: Booleans
 
 
-def rough_network(
+def coarse_network(
     graph: Graph,
     map_id: str,
     extent: Extent,
     config: Config,
     is_inside: Booleans | None = None,
 ) -> PlaceNetwork:
-    """The place network of a rectangle of a map, the whole of it or what `is_inside`, (w, h)."""
+    """Make the place network of a rectangle of a map, or of what `is_inside` of it, (w, h)."""
     window = graph.places.window(map_id, COLUMNS, extent)
     is_road = window.column(PlaceColumn.ROAD) >= ROAD_FROM
-    share = np.where(is_road, 1.0, config.unknown_weight)
+    share = np.where(is_road, 1.0, 1 / config.unknown_cost)
     if is_inside is not None:
         share[~is_inside] = 0.0
 
-    here = Here(window.origin, window.shape, graph.cell_m(map_id))
-    return here.network(link_weights(window.weights(), share))
+    return PlaceNetwork(window.origin, graph.cell_m(map_id), uncut_links(window.weights(), share))
 
 
 def routes_between(
-    network: PlaceNetwork, ends_m: Floats, longest_m: Floats | None = None
+    network: PlaceNetwork, ends_m: Floats, max_cost_m: Floats | None = None
 ) -> Routes | None:
-    """The routes between each two of (n, 2) positions; None where one is outside, or not
-    connected, or a route costs more than those two's `longest_m`, (n, n).
+    """Find the routes between each two of (n, 2) positions; None if one is outside, or not
+    connected, or a route costs more than those two's `max_cost_m`, (n, n).
     """
     links = Links(network)
     cells: list[Cell] = []
@@ -59,13 +58,13 @@ def routes_between(
         if goal is None:
             return None
 
-        field = spread_over(links, np.array([goal]))
+        field = spread(network, np.array([goal]), links)
         for other, start in enumerate(cells):
-            route = climb(network, field, start)
+            route = field.climb(start)
             if route is None:
                 return None
             cost_m = field.distance_m[network.index_of(start)]
-            if longest_m is not None and cost_m > longest_m[number, other]:
+            if max_cost_m is not None and cost_m > max_cost_m[number, other]:
                 return None
             is_passed[tuple((route - network.origin).T)] = True
         cells.append(goal)
@@ -74,12 +73,12 @@ def routes_between(
 
 
 def _linked(network: PlaceNetwork, links: Links, position_m: Floats) -> Cell | None:
-    """The cell nearest to a position that a link leads to, within SNAP."""
+    """Return the cell nearest to a position that a link leads to, within SNAP."""
     middle = np.rint(position_m / network.cell_m).astype(np.int64)
     around = np.argwhere(np.ones((2 * SNAP + 1, 2 * SNAP + 1))) - SNAP
     cells = middle + around[np.hypot(*around.T).argsort(kind="stable")]
     for i, j in cells.tolist():
-        if links.contain((i, j)) and links.is_linked[links.node((i, j))]:
+        if network.contains((i, j)) and links.number[network.index_of((i, j))] >= 0:
             return i, j
 
     return None

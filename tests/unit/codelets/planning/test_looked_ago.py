@@ -9,12 +9,12 @@ import pytest
 
 from cogmap.geometry.arrays import Floats
 from cogmap.schemas.nodes import PathColumn
-from cogmap.services.codelets.planning.looks import LOOK_M, looked_ago_s
-from cogmap.services.codelets.planning.network import Here
+from cogmap.services.codelets.planning.network import PlaceGrid
+from cogmap.services.codelets.planning.place_cost import LOOK_M, looked_ago_s
 from cogmap.testing import agent
 
 NOW_S = 1000.0
-HERE = Here((-10, -10), (60, 21), 1.0)
+HERE = PlaceGrid((-10, -10), (60, 21), 1.0)
 
 
 def _looked_ago_s(*rows: tuple[float, float, float]) -> Floats:

@@ -40,16 +40,29 @@ def observations_left(
     """
     operations: list[Operation] = []
     moved: defaultdict[tuple[int, str], list[Floats]] = defaultdict(list)
-    for node in _observations_along(graph, segment):
+    names = sorted(graph.links.sources(segment, LinkKind.ALONG))
+    for node in nodes_of(graph, Observations, names):
         rows = node.rows.numpy()
         place = joined.places[:, STAMP].searchsorted(rows[:, ObservationColumn.STAMP_S])
         stays = joined.stays[place]
         if stays.all():
             continue
 
-        operations.append(_with_rows(node, rows[stays]))
-        numbers_there = numbers[joined.into[place[~stays]]]
-        for number, row in zip(numbers_there.tolist(), _moved(rows, place, joined), strict=True):
+        if stays.any():
+            left = msgspec.structs.replace(node, rows=Matrix.of(rows[stays]))
+            operations.append(left)
+        else:
+            operations.append(DropNode(id=node.id))
+
+        # Seen from what the joined places become.
+        there = place[~stays]
+        offsets = joined.offsets[there]
+        gone = rows[~stays]
+        gone[:, ObservationColumn.STAMP_S] = joined.stamps_s[there]
+        gone[:, WHERE] = transform_from(offsets, gone[:, WHERE])
+        gone[:, SPREAD] = np.hypot(gone[:, SPREAD], JOIN_SD_M)
+        gone[:, DIRECTION] += offsets[:, 2]
+        for number, row in zip(numbers[joined.into[there]].tolist(), gone, strict=True):
             moved[number, node.landmark].append(row)
 
     for (number, landmark), added in sorted(moved.items()):
@@ -58,8 +71,8 @@ def observations_left(
 
 
 def closures_left(closures: Sequence[LoopClosure], ends: Views, joined: Joining) -> list[Operation]:
-    """What becomes of loop closures, the places of whose `ends` are counted from the first of the
-    joined ones on.
+    """Return what becomes of loop closures, the places of whose `ends` are counted from the first
+    of the joined ones on.
 
     Of those to these places the accepted ones to places that stay are left. Those from a joined
     place are from what that becomes.
@@ -72,37 +85,23 @@ def closures_left(closures: Sequence[LoopClosure], ends: Views, joined: Joining)
         if is_settled and not (joined.stays[j] and closure.accepted):
             operations.append(DropNode(id=closure.id))
         elif 0 <= i < count and not joined.stays[i]:
-            operations.append(_from(closure, float(joined.stamps_s[i]), offsets[i]))
+            if closure.sd_rad:
+                # It is by a place, and states that the headings are equal.
+                operations.append(DropNode(id=closure.id))
+                continue
+
+            there_m = transform_from(offsets[i], np.array([closure.ahead_m, closure.left_m]))
+            ahead_m, left_m = there_m.tolist()
+            after = msgspec.structs.replace(
+                closure,
+                from_ns=round(float(joined.stamps_s[i]) * 1e9),
+                ahead_m=ahead_m,
+                left_m=left_m,
+                sd_m=math.hypot(closure.sd_m, JOIN_SD_M),
+            )
+            operations.append(after)
 
     return operations
-
-
-def _observations_along(graph: Graph, segment: str) -> list[Observations]:
-    names = sorted(graph.links.sources(segment, LinkKind.ALONG))
-    return nodes_of(graph, Observations, names)
-
-
-def _with_rows(node: Observations, rows: Floats) -> Operation:
-    """Observations with other (n, 6) rows; they are dropped where there are none."""
-    if not len(rows):
-        return DropNode(id=node.id)
-    return msgspec.structs.replace(node, rows=Matrix.of(rows))
-
-
-def _moved(rows: Floats, place: Indices, joined: Joining) -> Floats:
-    """(m, 6): those of (n, 6) observations that are from joined places, by (n,) `place`, from what
-    these become.
-    """
-    is_moved = ~joined.stays[place]
-    there = place[is_moved]
-    offsets = joined.offsets[there]
-
-    moved = rows[is_moved]
-    moved[:, ObservationColumn.STAMP_S] = joined.stamps_s[there]
-    moved[:, WHERE] = transform_from(offsets, moved[:, WHERE])
-    moved[:, SPREAD] = np.hypot(moved[:, SPREAD], JOIN_SD_M)
-    moved[:, DIRECTION] += offsets[:, 2]
-    return moved
 
 
 def _added(graph: Graph, number: int, landmark: str, rows: Floats) -> list[Operation]:
@@ -125,21 +124,3 @@ def _added(graph: Graph, number: int, landmark: str, rows: Floats) -> list[Opera
         rows=Matrix.of(rows[first]),
     )
     return [after] if before is not None else [after, *links_of(after)]
-
-
-def _from(closure: LoopClosure, stamp_s: float, offset: Floats) -> Operation:
-    """A closure that leads from the place at `stamp_s`, in whose frame the one before has the pose
-    `offset` (3,). One that is by a place is dropped, as it states that the headings are equal.
-    """
-    if closure.sd_rad:
-        return DropNode(id=closure.id)
-
-    there_m = transform_from(offset, np.array([closure.ahead_m, closure.left_m]))
-    ahead_m, left_m = there_m.tolist()
-    return msgspec.structs.replace(
-        closure,
-        from_ns=round(stamp_s * 1e9),
-        ahead_m=ahead_m,
-        left_m=left_m,
-        sd_m=math.hypot(closure.sd_m, JOIN_SD_M),
-    )

@@ -1,0 +1,97 @@
+"""Routes along lines of sight (beyond the paper): along links in eight directions a line through a
+street is up to 8 % longer than straight.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats, Indices
+from cogmap.services.codelets.planning.network import Cell
+
+MAX_CELLS = 100
+"""Of a line: by then it is longer than most streets."""
+
+# So many ends of a line are tried at once: most routes bend within a few places.
+_AT_ONCE = 12
+
+# Half a cell, nearly: from there on another cell is nearer.
+_INSIDE = 0.49
+
+
+def straightened(route: Indices, cost: Floats, origin: Cell) -> Floats:
+    """Replace the bends of a route of (n, 2) neighbouring cells by straight lines of at most
+    MAX_CELLS, if these are no dearer by the cost of places, (w, h) from the cell `origin`.
+
+    Its (m, 2) positions are in cells, each nearest to the cell that it leads over: between the
+    middles of two cells a straight line has no steps, at which an agent would slow down.
+    """
+    inside = route - np.array(origin)
+    steps = np.hypot(*np.diff(inside, axis=0).T)
+    dearer = np.maximum(cost[tuple(inside[:-1].T)], cost[tuple(inside[1:].T)])
+    spent = np.concatenate([[0.0], np.cumsum(steps * dearer)])
+
+    positions = [inside[:1].astype(np.float64)]
+    at = 0
+    while at < len(inside) - 1:
+        end = _farthest(inside, spent, cost, at)
+        positions.append(_along(inside[at], inside[end])[1:])
+        at = end
+
+    line: Floats = np.concatenate(positions) + np.array(origin)
+    return line
+
+
+def straight(start: Indices, ends: Indices) -> tuple[Indices, Indices]:
+    """Return (m, n, 2) neighbouring cells from one to each of (m, 2) others, as nearly in a
+    straight line as can be, each line's last repeated to the length of the longest; (m,) how many
+    steps each has.
+    """
+    away = ends - start
+    steps = np.abs(away).max(axis=1).clip(1)
+    along = np.arange(int(steps.max()) + 1)[:, None].clip(max=steps)
+    # In whole numbers, so that the line is the same on every machine.
+    moved = (2 * along[..., None] * away + steps[:, None]) // (2 * steps[:, None])
+    cells: Indices = start + moved.swapaxes(0, 1)
+    return cells, steps
+
+
+def _along(start: Indices, end: Indices) -> Floats:
+    """Return the (n, 2) positions of a straight line that are nearest to its cells."""
+    cells, steps = straight(start, end[None])
+    exact = start + np.arange(steps[0] + 1)[:, None] * (end - start) / steps[0]
+    positions: Floats = exact.clip(cells[0] - _INSIDE, cells[0] + _INSIDE)
+    return positions
+
+
+def _farthest(route: Indices, spent: Floats, cost: Floats, at: int) -> int:
+    """Return the number of the last cell of a route before one to which a line from number `at` is
+    dearer than the route; that of the next cell in any case.
+    """
+    last = min(at + MAX_CELLS, len(route) - 1)
+    first = at + 2
+    while first <= last:
+        chosen = np.arange(first, min(first + _AT_ONCE, last + 1))
+        is_dearer = _costs(route[at], route[chosen], cost) > spent[chosen] - spent[at] + 1e-9
+        if is_dearer.any():
+            return max(int(chosen[is_dearer.argmax()]) - 1, at + 1)
+        first += _AT_ONCE
+
+    return max(last, at + 1)
+
+
+def _costs(start: Indices, ends: Indices, cost: Floats) -> Floats:
+    """Return the (m,) costs of straight lines, infinite for one that passes a blocked place, or
+    between two of which one is.
+    """
+    cells, steps = straight(start, ends)
+    i, j = cells.transpose(2, 0, 1)
+    on = cost[i, j]
+    dearer = np.maximum(on[:, 1:], on[:, :-1])
+    is_corner = np.isinf(cost[i[:, 1:], j[:, :-1]]) | np.isinf(cost[i[:, :-1], j[:, 1:]])
+
+    is_step = np.arange(1, cells.shape[1]) <= steps[:, None]
+    length = np.hypot(*(ends - start).T) / steps
+    total = np.where(is_step, dearer, 0.0).sum(axis=1) * length
+    total[(is_corner & is_step).any(axis=1)] = np.inf
+    return np.asarray(total)

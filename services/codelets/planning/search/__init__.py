@@ -1,1 +1,0 @@
-"""Routes over one network that changes: exact, or on a hierarchy of its levels."""
