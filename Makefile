@@ -11,13 +11,12 @@ help:
 
 setup: $(INSTALLED) ## install into .venv, nothing else
 
-# pybullet, which the simulator needs, has wheels for one Python and one platform.
-SIMULATES = import platform, sys; sys.exit((sys.version_info[:2], sys.platform, platform.machine()) != ((3, 11), "linux", "x86_64"))
+RUNS = import sys; sys.exit(sys.version_info < (3, 11))
 
 $(INSTALLED): requirements/run.txt requirements/build.txt requirements/dev.txt pyproject.toml
-	@$(PYTHON) -c '$(SIMULATES)' || { \
-	    echo "The simulator needs Python 3.11 on Linux x86-64, and $(PYTHON) is not that:" \
-	        "name one with PYTHON=/path/to/python3.11, or use docker compose up" >&2; exit 1; }
+	@$(PYTHON) -c '$(RUNS)' || { \
+	    echo "It needs Python 3.11 or newer, and $(PYTHON) is older:" \
+	        "name one with PYTHON=/path/to/python3, or use docker compose up" >&2; exit 1; }
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/dev.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .

@@ -81,7 +81,7 @@ def drive(
     """Drive `laps`, at most `seconds`, leaving the files of `cogmap run` in `folder`; `settings`
     are those that are not the default's.
 
-    Ctrl-C ends the process. Raises CogmapError where the robot never moved.
+    Ctrl-C ends the process. Raises CogmapError if the robot never moved.
     """
     began_s = time.monotonic()
     display = display_on(Console(stderr=True))
@@ -107,7 +107,7 @@ def drive(
 
 
 def recording(folder: Path) -> Summary:
-    """The recorder's summary of the drive in `folder`. Raises CogmapError where it has none."""
+    """The recorder's summary of the drive in `folder`. Raises CogmapError if it has none."""
     about = LogReader(folder / LOG_NAME).about(SUMMARY)
 
     if not about:

@@ -147,7 +147,7 @@ class CycleMeter:
 
     @property
     def cycles(self) -> int:
-        """How many cycles have ended."""
+        """The number of cycles that have ended."""
         return len(self.marks) - 1
 
     def listen(self, runner: InProcessRunner, counted: Iterable[Topic]) -> None:

@@ -20,7 +20,7 @@ Metrics = dict[str, float]
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one benchmark measured, by key; `failure` is why it could not, or empty."""
+    """The metrics of one benchmark by key; `failure` is the reason if it could not measure."""
 
     benchmark: str
     thresholds: Mapping[str, Threshold]

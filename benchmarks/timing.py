@@ -1,4 +1,4 @@
-"""How code is timed, and the unit by which timings of two machines are compared."""
+"""The timing of code, and the unit by which timings of two machines are compared."""
 
 from __future__ import annotations
 

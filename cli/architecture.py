@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 
@@ -70,24 +70,19 @@ def diagram(modules: list[Module]) -> str:
     lines += [f'    {module.name}["{module.name}"]' for module in modules]
     lines.append(f'    {OBSERVERS}(["{OBSERVERS}"])')
 
-    lines += _arrows(modules)
-    lines += ["```", ""]
-    return "\n".join(lines)
-
-
-def _arrows(modules: list[Module]) -> Iterator[str]:
-    """An arrow for all topics of one delivery between the same two ends."""
+    # One arrow for all topics of one delivery between the same two ends.
     arrows: dict[tuple[str, str, Delivery], list[str]] = {}
     for topic in topics.ALL:
-        senders, receivers = _ends(topic, modules)
+        senders, receivers = ends(topic, modules)
         for sender, receiver in product(senders, receivers):
             if receiver != sender:
-                arrow = (sender, receiver, topic.delivery)
-                arrows.setdefault(arrow, []).append(topic.name)
-
+                arrows.setdefault((sender, receiver, topic.delivery), []).append(topic.name)
     for (sender, receiver, delivery), names in arrows.items():
         label = "<br/>".join(names)
-        yield f'    {sender} {_ARROWS[delivery]}|"{label}"| {receiver}'
+        lines.append(f'    {sender} {_ARROWS[delivery]}|"{label}"| {receiver}')
+
+    lines += ["```", ""]
+    return "\n".join(lines)
 
 
 def topic_table(modules: list[Module]) -> str:
@@ -97,7 +92,7 @@ def topic_table(modules: list[Module]) -> str:
         "|---|---|---|---|---|---|---|",
     ]
     for topic in topics.ALL:
-        senders, receivers = _ends(topic, modules)
+        senders, receivers = ends(topic, modules)
         facts = [
             f"`{topic.name}`",
             topic.type.__name__,
@@ -128,24 +123,17 @@ def _kinds(written: frozenset[Written]) -> str:
     return ", ".join(nodes + others) or "nothing"
 
 
-def _ends(topic: Topic, modules: list[Module]) -> tuple[list[str], list[str]]:
+def ends(topic: Topic, modules: list[Module]) -> tuple[list[str], list[str]]:
     """Who sends `topic` and who receives it: modules by name, else the observers."""
-    if topic.delivery is Delivery.ON_REQUEST:
-        return _ends_on_request(topic, modules)
+    if topic.delivery is not Delivery.ON_REQUEST:
+        senders = [module.name for module in modules if topic in module.emits]
+        receivers = [module.name for module in modules if topic in module.handlers]
+        return senders, receivers or [OBSERVERS]
 
-    senders = [module.name for module in modules if topic in module.emits]
-    receivers = [module.name for module in modules if topic in module.handlers]
-    return senders, receivers or [OBSERVERS]
-
-
-def _ends_on_request(topic: Topic, modules: list[Module]) -> tuple[list[str], list[str]]:
-    asked = []
-    replying = []
-    for module in modules:
-        if topic in module.served:
-            asked.append(module.name)
-        if topic in [reply for reply, _ in module.served.values()]:
-            replying.append(module.name)
+    asked = [module.name for module in modules if topic in module.served]
+    replying = [
+        module.name for module in modules if topic in [reply for reply, _ in module.served.values()]
+    ]
     return replying or [OBSERVERS], asked or [OBSERVERS]
 
 

@@ -28,13 +28,15 @@ Schema = dict[str, Any]
 @laps_option
 @lockstep_option
 @codelets_option
-@click.option("--record/--no-record", default=True, help="Whether the drive waits for a recorder.")
+@click.option(
+    "--record/--no-record", default=True, help="Let the drive wait for a recorder, or not."
+)
 @click.option(
     "-o",
     "--output",
     type=click.File("w", encoding="utf-8", atomic=True),
     default="-",
-    help="Where to write it.",
+    help="The file to write.  [default: standard output]",
 )
 @json_option
 @click.option("--schema", is_flag=True, help="Print the JSON Schema of the configuration file.")
@@ -91,15 +93,10 @@ def described(sections: Sections) -> dict[str, Any]:
     modules = {}
     for name, values in sections.items():
         keys = _keys(whole["properties"][name], whole)
-        modules[name] = {
-            key: {"value": values.get(key), **_without_default(schema)}
-            for key, schema in keys.items()
-        }
+        modules[name] = {key: {"value": values.get(key), **schema} for key, schema in keys.items()}
+        for facts in modules[name].values():
+            facts.pop("default", None)
     return modules
-
-
-def _without_default(schema: Schema) -> Schema:
-    return {name: value for name, value in schema.items() if name != "default"}
 
 
 def _keys(schema: Schema, whole: Schema) -> dict[str, Schema]:

@@ -1,4 +1,4 @@
-"""`cogmap goal`: gives a running system goals, and prints the plan that it makes of them."""
+"""`cogmap goal`: gives goals to a running system, and prints its plan."""
 
 from __future__ import annotations
 
@@ -45,11 +45,8 @@ class Person:
             self.graph,
             self._on_delta,
             emits=[topics.OFFER],
-            on_load=self._on_load,
+            on_load=self._offer,
         )
-
-    def _on_load(self) -> list[Message]:
-        return self._offer()
 
     def _on_delta(self, delta: Delta) -> list[Message]:
         """Offer once; look for the plan in what follows."""
@@ -112,9 +109,11 @@ class Person:
     "path",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="More goals, one a line: a name, or x and y.",
+    help="Read more goals from FILE, one per line: a name, or x and y.",
 )
-@click.option("--clear", is_flag=True, help="Forget the goals that the agent has; alone it stops.")
+@click.option(
+    "--clear", is_flag=True, help="Forget the goals that the agent has; without new ones it stops."
+)
 @click.option(
     "--wait",
     "timeout_s",
@@ -138,9 +137,9 @@ def goal(
 ) -> None:
     """Send the agent of a running system somewhere.
 
-    A goal is the name of an object that is on its map, or a position in metres in the frame of the
-    map, whose origin is where the agent began, x ahead and y to the left. The agent plans the order
-    of several goals itself. Prints the plan; ends with 1 where a goal has no route.
+    A goal is the name of an object on its map, or a position X Y in metres on the map: the origin
+    is where the agent started, X is ahead of it there, and Y to the left. The agent plans the order
+    of several goals itself. Prints the plan; ends with 1 if no route leads to a goal.
 
     \b
     cogmap goal bakery
@@ -176,10 +175,9 @@ def goal(
 
 
 def parsed(words: Iterable[str]) -> list[Goal]:
-    """The goals that words give: two numbers in a row are a position, any other word a name.
+    """Parse goals: two numbers in a row are a position, any other word is a name.
 
-    Raises UsageError where a number stands alone or is absurd, and where a word is an option that
-    there is not.
+    Raises UsageError for a single or an absurd number, and for an unknown option.
     """
     goals = []
     left = list(words)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
 from typing import Any
 
 import click
@@ -14,16 +13,16 @@ from cogmap.cli.topic.observing import inspect_system
 from cogmap.errors import UsageError
 from cogmap.schemas.topics import Topic
 
-_VERBS = {Role.PUBLISHES: "publishes", Role.SUBSCRIBES: "subscribes", Role.ANSWERS: "answers"}
+VERBS = {Role.PUBLISHES: "publishes", Role.SUBSCRIBES: "subscribes", Role.ANSWERS: "answers"}
 
 
 @click.command()
-@click.option("--dot", is_flag=True, help="Print Graphviz's language, to be drawn by `dot -Tsvg`.")
+@click.option("--dot", is_flag=True, help="Print a graph for Graphviz: `dot -Tsvg` draws it.")
 @json_option
 @connect_option
 @agent_option
 def graph(dot: bool, as_json: bool, connect: str, agent: str) -> None:
-    """Show which process publishes and subscribes what."""
+    """Show which process publishes, subscribes to and answers which topics."""
     if dot and as_json:
         raise UsageError("--dot and --json exclude each other: choose one")
 
@@ -56,32 +55,19 @@ def to_tree(system: System) -> str:
 
     lines: list[str] = []
     for process, roles in uses_of(system).items():
-        lines += _branch(process, roles)
-    for name in system.unknown_topics():
-        lines.append(f"not a topic of this version: {name}")
+        module = process.member.module if process.member is not None else process.name
+        lines.append(process.name if module == process.name else f"{process.name} ({module})")
+
+        used = [role for role, found in roles.items() if found]
+        for role in used:
+            fork, margin = ("└─", " ") if role is used[-1] else ("├─", "│")
+            lines.append(f"{fork} {VERBS[role]}")
+            *others, last = roles[role]
+            lines += [f"{margin}  ├─ {topic.name}" for topic in others]
+            lines.append(f"{margin}  └─ {last.name}")
+
+    lines += [f"not a topic of this version: {name}" for name in system.unknown_topics()]
     return "\n".join(lines)
-
-
-def _branch(process: Process, roles: dict[Role, list[Topic]]) -> list[str]:
-    title = process.name
-    if process.member is not None and process.member.module != process.name:
-        title += f" ({process.member.module})"
-
-    lines = [title]
-    used = [role for role, found in roles.items() if found]
-    for role in used:
-        is_last = role is used[-1]
-        lines.append(f"{_fork(is_last)} {_VERBS[role]}")
-        lines += _twigs(roles[role], " " if is_last else "│")
-    return lines
-
-
-def _twigs(found: list[Topic], margin: str) -> list[str]:
-    return [f"{margin}  {_fork(topic is found[-1])} {topic.name}" for topic in found]
-
-
-def _fork(is_last: bool) -> str:
-    return "└─" if is_last else "├─"
 
 
 def to_json(system: System) -> str:
@@ -94,7 +80,7 @@ def to_json(system: System) -> str:
             "zid": process.zid,
         }
         for role, found in roles.items():
-            facts[_VERBS[role]] = [topic.name for topic in found]
+            facts[VERBS[role]] = [topic.name for topic in found]
         processes.append(facts)
     return json.dumps(processes)
 
@@ -104,14 +90,9 @@ def to_dot(system: System) -> str:
     lines = ["digraph cogmap {", "  rankdir=LR;"]
     lines += [f'  "{topic.name}" [shape=box];' for topic in system.topics()]
     for process, roles in uses_of(system).items():
-        lines += _dot_arrows(process.name, roles)
+        name = process.name
+        lines += [f'  "{name}" -> "{topic.name}";' for topic in roles[Role.PUBLISHES]]
+        lines += [f'  "{topic.name}" -> "{name}";' for topic in roles[Role.SUBSCRIBES]]
+        for topic in roles[Role.ANSWERS]:
+            lines.append(f'  "{name}" -> "{topic.name}" [dir=both, style=dashed];')
     return "\n".join([*lines, "}"])
-
-
-def _dot_arrows(name: str, roles: dict[Role, list[Topic]]) -> Iterator[str]:
-    for topic in roles[Role.PUBLISHES]:
-        yield f'  "{name}" -> "{topic.name}";'
-    for topic in roles[Role.SUBSCRIBES]:
-        yield f'  "{topic.name}" -> "{name}";'
-    for topic in roles[Role.ANSWERS]:
-        yield f'  "{name}" -> "{topic.name}" [dir=both, style=dashed];'

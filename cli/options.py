@@ -28,38 +28,36 @@ connect_option = click.option(
     default=DEFAULT_ENDPOINT,
     show_default=True,
     envvar="COGMAP_CONNECT",
-    help="The router's endpoint.",
+    help="Where the router listens.",
 )
 
 
-def _agent(context: click.Context, option: click.Parameter, value: str) -> str:
+def _checked(context: click.Context, option: click.Parameter, name: str) -> str:
     """Refuse a name that cannot be part of a key. Raises UsageError."""
-    check_name("--agent", value)
-    return value
+    check_name("--agent", name)
+    return name
 
 
 agent_option = click.option(
     "--agent",
-    callback=_agent,
+    callback=_checked,
     default=DEFAULT_AGENT,
     show_default=True,
     envvar="COGMAP_AGENT",
-    help="Whose topics, where several agents share a bus.",
+    help="The agent whose topics are meant, if several share a bus.",
 )
 config_option = click.option(
     "--config",
     "config_path",
     type=click.Path(path_type=Path),
     envvar="COGMAP_CONFIG",
-    help="A TOML file, a section a module.",
+    help="A file of settings in TOML, as `cogmap config` prints it.",
 )
 set_option = click.option(
     "--set",
     "settings",
     multiple=True,
     metavar="MODULE.KEY=VALUE",
-    help="Override one key; repeat at will.",
+    help="Override one setting; may be repeated.",
 )
-json_option = click.option(
-    "--json", "as_json", is_flag=True, help="Print JSON, for other programs."
-)
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")

@@ -7,7 +7,6 @@ import time
 import click
 
 from cogmap.bus.interface import Arrival
-from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.options import agent_option, connect_option
 from cogmap.cli.topic.observing import observing
 from cogmap.cli.topic.pub import Publisher
@@ -18,6 +17,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.sensing import StreetClosure, TrueTown
 
 ANSWER_S = 10
+"""Time for the simulation to publish the town; on a busy machine it takes a few seconds."""
 
 name_argument = click.argument("name")
 
@@ -26,8 +26,8 @@ name_argument = click.argument("name")
 def street() -> None:
     """Close streets of the simulated town, and open them.
 
-    A barrier then stands across the street, and the agent has to see it: nothing else informs it.
-    The names are those in `truth/town`, such as "Elm Street 2".
+    A closed street has a barrier across it, which the agent has to see: nothing else informs it.
+    `cogmap topic echo --once truth/town` shows the names, such as "Elm Street 2".
     """
 
 
@@ -36,8 +36,8 @@ def street() -> None:
 @connect_option
 @agent_option
 def close(name: str, connect: str, agent: str) -> None:
-    """Put a barrier across the street NAME."""
-    _change(StreetClosure(street=name, closed=True), connect, agent)
+    """Close the street NAME by a barrier."""
+    change(StreetClosure(street=name, closed=True), connect, agent)
 
 
 @street.command("open")
@@ -45,67 +45,43 @@ def close(name: str, connect: str, agent: str) -> None:
 @connect_option
 @agent_option
 def open_(name: str, connect: str, agent: str) -> None:
-    """Take the barrier away from the street NAME."""
-    _change(StreetClosure(street=name, closed=False), connect, agent)
+    """Open the street NAME: remove the barrier."""
+    change(StreetClosure(street=name, closed=False), connect, agent)
 
 
-def _change(closure: StreetClosure, connect: str, agent: str) -> None:
+def change(closure: StreetClosure, connect: str, agent: str) -> None:
     """Publish `closure` until the town is published as it should be. Raises NoAnswerError."""
+    done = "closed" if closure.closed else "open"
+    inbox = Inbox()
+    intake = Intake()
     with observing(connect, agent, "street") as bus:
-        towns = _Towns(bus)
+        bus.subscribe(topics.TRUE_TOWN, inbox.put, intake.count_lost)
         publisher = Publisher(bus, topics.STREET_CLOSURE, closure)
-        if not _is_answered(publisher, towns, closure):
-            raise NoAnswerError(
-                f"no street {closure.street!r} was {_done(closure)} within {ANSWER_S} s: see that "
-                f"the simulation runs, and for the names `cogmap topic echo --once truth/town`"
-            )
+        for _ in range(ANSWER_S):  # the simulation may not have subscribed yet
+            publisher.publish()
+            if _is_shown(closure, inbox, intake):
+                click.echo(f"{closure.street} is {done}")
+                return
 
-    click.echo(f"{closure.street} is {_done(closure)}")
+    raise NoAnswerError(
+        f"no street {closure.street!r} was {done} within {ANSWER_S} s: see that the simulation "
+        "runs, and for the names `cogmap topic echo --once truth/town`"
+    )
 
 
-def _is_answered(publisher: Publisher, towns: _Towns, closure: StreetClosure) -> bool:
-    """Publish once a second, as the simulation may not have subscribed yet; whether the town
-    changes.
-    """
-    for _ in range(ANSWER_S):
-        publisher.publish()
-        if towns.show(closure, 1.0):
+def _is_shown(closure: StreetClosure, inbox: Inbox, intake: Intake) -> bool:
+    """Whether a town that is published within a second shows the street as it should be."""
+    until_s = time.monotonic() + 1.0
+    while (left_s := until_s - time.monotonic()) > 0:
+        arrival = inbox.take(left_s)
+        town = intake.accept(arrival) if isinstance(arrival, Arrival) else None
+        if isinstance(town, TrueTown) and is_as_asked(town, closure):
             return True
-
     return False
-
-
-def _done(closure: StreetClosure) -> str:
-    return "closed" if closure.closed else "open"
-
-
-class _Towns:
-    """The towns that the simulation publishes from now on."""
-
-    def __init__(self, bus: ZenohBus) -> None:
-        self._inbox = Inbox()
-        self._intake = Intake()
-        bus.subscribe(topics.TRUE_TOWN, self._inbox.put, self._intake.count_lost)
-
-    def show(self, closure: StreetClosure, timeout_s: float) -> bool:
-        """Whether one of them shows the street as it should be, within `timeout_s`."""
-        until_s = time.monotonic() + timeout_s
-        while (left_s := until_s - time.monotonic()) > 0:
-            arrival = self._inbox.take(left_s)
-            if not isinstance(arrival, Arrival):
-                continue
-
-            town = self._intake.accept(arrival)
-            if isinstance(town, TrueTown) and is_as_asked(town, closure):
-                return True
-
-        return False
 
 
 def is_as_asked(town: TrueTown, closure: StreetClosure) -> bool:
     """Whether a town has the street, closed or open as asked."""
-    for each in town.streets:
-        if each.name == closure.street:
-            return each.closed == closure.closed
-
-    return False
+    return any(
+        street.name == closure.street and street.closed == closure.closed for street in town.streets
+    )

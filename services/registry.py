@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
+from importlib.util import find_spec
 from inspect import signature
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -124,6 +125,10 @@ def prepare(name: str) -> Iterator[None]:
 
         egl_trial.trial()
         yield
+
+        if find_spec("pybullet") is not None:
+            import_module("cogmap.services.sim.camera_level")
+            yield
 
     if runs_codelets(name):
         for part in _OF_CODELETS:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import threading
 import time
 import timeit
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from statistics import median
 
 import numpy as np
 import zenoh
 
-from benchmarks.bus.race import REPLICAS, Pace, Race, pace
+from benchmarks.bus.race import REPLICAS, Race, pace
 from benchmarks.report import Metrics
 from cogmap.bus.codec import decode, encode
 from cogmap.bus.session import open_client, open_router
@@ -39,43 +39,31 @@ LINK_KIND = "near"
 
 
 def typical_operations() -> list[Operation]:
-    """50 nodes, 200 links and one cloud of samples: 31 KB, in operations of the workspace."""
-    rng = np.random.default_rng(SEED)
-    samples = rng.normal(size=(SAMPLES, 3))
-    agent = Self(id=SELF_ID, samples=Matrix.of(samples))
-    objects = [_object(number) for number in range(1, NODES)]
-    nodes: list[AnyNode] = [agent, *objects]
+    """Return operations of the workspace: 50 nodes, 200 links and a cloud of samples, 31 KB."""
+    samples = np.random.default_rng(SEED).normal(size=(SAMPLES, 3))
+    nodes: list[AnyNode] = [Self(id=SELF_ID, samples=Matrix.of(samples))]
+    for number in range(1, NODES):
+        label = f"building_{number}"
+        node = Object(
+            id=object_id(label),
+            activation=0.75,
+            base_level=0.25,
+            label=label,
+            x_m=number * 1.5,
+            y_m=number * 0.5,
+            sightings=number,
+        )
+        nodes.append(node)
 
     weights = {}
-    for number, node in enumerate(nodes):
-        weights[node.id] = _links(number)
+    for number, each in enumerate(nodes):
+        weights[each.id] = {f"place:{at}:{-at}": 0.5 for at in range(number, LINKS, NODES)}
 
     return [*nodes, Links(kind=LINK_KIND, weights=weights)]
 
 
-def _object(number: int) -> Object:
-    label = f"building_{number}"
-    return Object(
-        id=object_id(label),
-        activation=0.75,
-        base_level=0.25,
-        label=label,
-        x_m=number * 1.5,
-        y_m=number * 0.5,
-        sightings=number,
-    )
-
-
-def _links(number: int) -> dict[str, float]:
-    links = {}
-    for at in range(number, LINKS, NODES):
-        links[f"place:{at}:{-at}"] = 0.5
-
-    return links
-
-
 def measure(endpoint: str, number: int, pairs: int, announce: Callable[[str], None]) -> Metrics:
-    """The rates of both, in turn, through one router at `endpoint`; the ratio is the median."""
+    """Return the rates of both, in turn, through one router at `endpoint`, as medians."""
     router = open_router(endpoint)
     runs = []
     for pair in range(1, pairs + 1):
@@ -85,12 +73,7 @@ def measure(endpoint: str, number: int, pairs: int, announce: Callable[[str], No
         runs.append((ours, peer))
 
     router.close()  # type: ignore[no-untyped-call]
-    return _rates(runs) | costs()
-
-
-def _rates(runs: Sequence[tuple[Pace, Pace]]) -> Metrics:
-    """The medians of pairs of runs, ours and the peer's."""
-    return {
+    return costs() | {
         "delta_rate_ratio": median(ours.rate_hz / peer.rate_hz for ours, peer in runs),
         "delta_rate_hz": median(ours.rate_hz for ours, _ in runs),
         "raw_put_rate_hz": median(peer.rate_hz for _, peer in runs),
@@ -100,7 +83,7 @@ def _rates(runs: Sequence[tuple[Pace, Pace]]) -> Metrics:
 
 
 def costs() -> Metrics:
-    """The CPU time of each step that a delta takes, where nothing else runs, and its size."""
+    """Return the CPU time of each step that a delta takes, if nothing else runs, and its size."""
     ledger = Ledger({})
     replica = Graph()
     operations = typical_operations()

@@ -19,7 +19,7 @@ _spawn = multiprocessing.get_context("spawn")
 
 @dataclass
 class Race:
-    """What the processes of one run share: `number` messages travel through `endpoint`.
+    """The state that the processes of one run share: `number` messages travel through `endpoint`.
 
     Each process releases `ready`; `go` starts the publisher; each receiver releases `done` when it
     has the last message; `end` lets all exit. `cpu_s` sums what they spent between ready and end.
@@ -71,7 +71,7 @@ def pace(
     """Let a process `publish` `number` messages to REPLICAS that `receive` them.
 
     The router at `endpoint` runs in the calling process, whose CPU time counts. Raises
-    CogmapError where a process does not answer within TIMEOUT_S.
+    CogmapError if a process does not answer within TIMEOUT_S.
     """
     race = Race.at(endpoint, number)
     processes = []
@@ -83,17 +83,6 @@ def pace(
     for _ in processes:
         _wait(race.ready)
 
-    took_s, router_s = _run(race)
-    race.end.set()
-    for process in processes:
-        process.join()
-
-    cpu_s = race.cpu_s.value + router_s
-    return Pace(rate_hz=number / took_s, cpu_us=1e6 * cpu_s / number)
-
-
-def _run(race: Race) -> tuple[float, float]:
-    """Let the publisher go: seconds until the receivers are done, the CPU time of the router."""
     began_s = time.monotonic()
     router_began_s = time.process_time()
     race.go.set()
@@ -101,7 +90,13 @@ def _run(race: Race) -> tuple[float, float]:
         _wait(race.done)
 
     router_s = time.process_time() - router_began_s
-    return time.monotonic() - began_s, router_s
+    took_s = time.monotonic() - began_s
+    race.end.set()
+    for process in processes:
+        process.join()
+
+    cpu_s = race.cpu_s.value + router_s
+    return Pace(rate_hz=number / took_s, cpu_us=1e6 * cpu_s / number)
 
 
 def _wait(semaphore: multiprocessing.synchronize.Semaphore) -> None:

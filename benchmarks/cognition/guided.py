@@ -44,7 +44,7 @@ MOVED_M = 0.1
 
 @dataclass(frozen=True)
 class Route:
-    """What became of a route of `length_m`: how far the agent was from its end after each of the
+    """The result of a route of `length_m`: how far the agent was from its end after each of the
     two drives, how often it ran into something on the first and on the second, how many schemes it
     learned, and how far it was from where it had driven before, on the mean.
     """
@@ -79,7 +79,7 @@ class Driven:
         self._moved_s = 0.0
 
     def on_pose(self, pose: TruePose) -> None:
-        """Where it is now."""
+        """Take the robot's pose."""
         here_m = (pose.pose.x_m, pose.pose.y_m)
         self.now_s = pose.stamp_ns / 1e9
         self.collisions = pose.collisions

@@ -1,4 +1,4 @@
-"""How long an agent that explores a town keeps its energy, at the level of percepts."""
+"""The life of an agent that explores a town on a battery, at the level of percepts."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 
 CAPACITY_S = 500.0
-"""How long a full battery lasts at rest: for less than a life, so that to stand still is no way to
+"""The time that a full battery lasts at rest: less than a life, so that to stand still is no way to
 live.
 """
 
 
 @dataclass(frozen=True)
 class Life:
-    """How an agent fared in a town: for how long it lived, its lowest level of energy, and how
-    often it was charged.
+    """An agent's life in a town: its time, its lowest level of energy, and how often it was
+    charged.
     """
 
     lived_s: float

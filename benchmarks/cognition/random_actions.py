@@ -1,4 +1,4 @@
-"""An agent that acts at random: what survival is worth beside."""
+"""An agent that acts at random, the baseline of survival."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 from cogmap.schemas.base import Scalar
-from cogmap.schemas.cognition import Action, ActionName, Behaviour, Behaviours
+from cogmap.schemas.cognition import Action, ActionName, Behaviours
 
 TURNS_RAD = (-math.pi / 2, math.pi / 2)
 
@@ -27,8 +27,14 @@ class RandomActions:
         return Module("action").on(topics.BEHAVIOURS, self.on_behaviours, emits=[topics.ACTION])
 
     def on_behaviours(self, behaviours: Behaviours) -> Action:
-        """An action, each as likely as any other."""
-        able = _able(behaviours.behaviours)
+        """Draw any of the actions that can be taken, which to halt and to turn always can."""
+        able: list[tuple[str, dict[str, Scalar]]] = [(ActionName.HALT, {})]
+        for turn_rad in TURNS_RAD:
+            able.append((ActionName.TURN, {"turn_rad": turn_rad}))
+        for behaviour in behaviours.behaviours:
+            if not behaviour.rejection and behaviour.action != ActionName.HALT:
+                able.append((behaviour.action, behaviour.parameters))
+
         action, parameters = able[int(self._rng.integers(len(able)))]
         return Action(
             stamp_ns=behaviours.stamp_ns,
@@ -39,17 +45,3 @@ class RandomActions:
             parameters=parameters,
             behaviours=behaviours.behaviours,
         )
-
-
-def _able(behaviours: list[Behaviour]) -> list[tuple[str, dict[str, Scalar]]]:
-    """The actions that can be taken, with their parameters: to halt and to turn always, and those
-    of the behaviours.
-    """
-    able: list[tuple[str, dict[str, Scalar]]] = [(ActionName.HALT, {})]
-    for turn_rad in TURNS_RAD:
-        able.append((ActionName.TURN, {"turn_rad": turn_rad}))
-    for behaviour in behaviours:
-        if not behaviour.rejection and behaviour.action != ActionName.HALT:
-            able.append((behaviour.action, behaviour.parameters))
-
-    return able

@@ -1,1 +1,1 @@
-"""What the agent learns from what is conscious: names that are expected, and surprises."""
+"""Learning from what is conscious: names that are expected, and surprises."""

@@ -1,4 +1,4 @@
-"""Whether surprises become conscious: buildings that are gone and streets that are closed, in towns
+"""Surprises that become conscious: buildings that are gone and streets that are closed, in towns
 that the agent has explored, at the level of percepts.
 """
 
@@ -87,7 +87,7 @@ class Surprise:
 
 @dataclass(frozen=True)
 class Surprises:
-    """What was there to be surprised by in a town, and how often the agent was by nothing."""
+    """The surprises of a town, and how often the agent was surprised by nothing."""
 
     buildings: list[Surprise]
     streets: list[Surprise]
@@ -243,7 +243,7 @@ class Judge(TownObserver):
         return [] if self._has_closed else self._close(goal)
 
     def _close(self, goal: str) -> list[Message]:
-        """Close a street of the route to the goal, where one can be."""
+        """Close a street of the route to the goal, if one can be."""
         plan = self.graph.get(Plan, PLAN_ID)
         if plan is None or plan.route is None or goal not in plan.goals or self.town is None:
             return []

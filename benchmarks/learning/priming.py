@@ -1,5 +1,5 @@
-"""Whether a building is named better when its neighbours were just conscious: two laps of held-out
-towns, each view in another light, seen by two extended PAMs, one of which expects nothing.
+"""The names of buildings whose neighbours were just conscious: two laps of held-out towns, each
+view in another light, seen by two extended PAMs, one of which expects nothing.
 
 Clear views of these towns are hardly ever ambiguous, so there is fog in the second lap.
 """
@@ -13,20 +13,20 @@ import numpy as np
 
 from benchmarks.perception import sequence
 from benchmarks.perception.objects import claims, sight
-from benchmarks.perception.scenes import FIRST_SEED, Scene, drawn
+from benchmarks.perception.pipeline import SensoryPipeline
+from benchmarks.perception.scenes import FIRST_SEED, Scene, drawn, side_and_range
 from benchmarks.report import Metrics
 from cogmap.geometry.arrays import Bytes
 from cogmap.parallel import parallel_map
 from cogmap.runtime.module import Module
-from cogmap.schemas.array import Array
 from cogmap.schemas.cognition import Broadcast, Coalition, Relation, Trigger
 from cogmap.schemas.nodes import Object, object_id
-from cogmap.schemas.sensing import Calibration, Odometry, Percept, Percepts, Pose, StereoFrame, View
+from cogmap.schemas.sensing import Percept, Percepts, Pose, View
 from cogmap.services import registry
 from cogmap.services.epam.recognition.functions import function_of
 from cogmap.services.sim.layout import town
 from cogmap.services.sim.layout.catalogue import CATALOGUE
-from cogmap.services.workspace.config import Config as WorkspaceConfig
+from cogmap.services.workspace.ingress import RECOGNITION_THRESHOLD
 
 TOWNS = 4
 # After the towns of `python -m benchmarks perception`.
@@ -38,8 +38,8 @@ TURN_RAD = 0.05
 FOG_REACH_M = 40.0
 FOG_GREY = 190.0
 NOISE_SD = 4.0
-PERIOD_NS = 400_000_000
-SURE = WorkspaceConfig().recognition_threshold
+PERIOD_S = 0.4
+SURE = RECOGNITION_THRESHOLD
 """With less evidence a view is ambiguous, and is not mapped by."""
 TRAINED = frozenset(kind.name for kind in CATALOGUE)
 
@@ -72,26 +72,49 @@ def measure(processes: int) -> Metrics:
 
 
 def namings_in(seed: int) -> list[Naming]:
-    """The buildings of trained kinds that are seen in the last lap of a town."""
+    """Return the buildings of trained kinds that are seen in the last lap of a town.
+
+    Two extended PAMs get its views. One of them also gets broadcasts of what was sure in the view
+    before, as attention to what is in view brings it.
+    """
+    bare = registry.build("epam", {"epam": {"priming": {"share": 0.0}}})
+    primed = registry.build("epam", {})
     found: list[Naming] = []
+
     with drawn(seed, 0, _laps) as (place, camera, scenes):
-        pair = _Pair(camera)
-        kinds = [plot.kind.name for plot in place.plots]
-        numbered = list(enumerate(scenes))
-        first_judged = len(numbered) // LAPS
+        sensory = SensoryPipeline(camera, PERIOD_S)
+        every = list(scenes)
         rng = np.random.default_rng([seed, 0xF0])
-        for number, scene in numbered:
-            if number < first_judged:
-                pair.see(scene)
-                continue
-            bare, primed = pair.see(_in_fog(scene, rng))
-            found += _compared(scene, kinds, place, bare, primed)
+
+        for number, clear in enumerate(every):
+            is_last_lap = number >= len(every) // LAPS
+            scene = in_fog(clear, rng) if is_last_lap else clear
+            view = sensory.view(sensory.next_frame(scene.left, scene.right))
+            without = _percepts(bare, view)
+            with_priming = _percepts(primed, view)
+
+            conscious = [percept for percept in without if percept.evidence > SURE]
+            if conscious:
+                primed.feed(_broadcast(view, conscious))
+            if is_last_lap:
+                found += _compared(scene, place, without, with_priming)
 
     return found
 
 
-def _in_fog(scene: Scene, rng: np.random.Generator) -> Scene:
-    """The scene in fog, of which a share of 1 - exp(-depth / FOG_REACH_M) is seen (Koschmieder's
+def _percepts(epam: Module, view: View) -> list[Percept]:
+    return next(each for each in epam.feed(view) if isinstance(each, Percepts)).objects
+
+
+def _laps(place: town.Town, rng: np.random.Generator) -> list[Pose]:
+    poses: list[Pose] = []
+    for _ in range(LAPS):
+        poses += sequence.poses(place.line(), rng, STEPS_M, OFFSET_M, TURN_RAD)
+    return poses
+
+
+def in_fog(scene: Scene, rng: np.random.Generator) -> Scene:
+    """Return the scene in fog, which hides a share of 1 - exp(-depth / FOG_REACH_M) (Koschmieder's
     law), with noise of the sensor. The depth of the left image serves for both.
     """
     depth_m = np.where(scene.depth_m > 0, scene.depth_m, np.inf)
@@ -103,49 +126,6 @@ def _in_fog(scene: Scene, rng: np.random.Generator) -> Scene:
         return np.asarray(noisy.clip(0, 255), np.uint8)
 
     return replace(scene, left=foggy(scene.left), right=foggy(scene.right))
-
-
-class _Pair:
-    """Sensory memory, and two extended PAMs that get its views and the same broadcasts: of what was
-    sure in the view before, as attention to what is in view brings it.
-    """
-
-    def __init__(self, camera: Calibration) -> None:
-        self._camera = camera
-        self._sensory = registry.build("sensory", {})
-        self._bare = registry.build("epam", {"epam": {"priming": {"share": 0.0}}})
-        self._primed = registry.build("epam", {})
-        self._frame = 0
-
-    def see(self, scene: Scene) -> tuple[list[Percept], list[Percept]]:
-        """The percepts of a view, without priming and with it."""
-        view = self._view(scene)
-        bare = _percepts(self._bare, view)
-        primed = _percepts(self._primed, view)
-
-        conscious = [percept for percept in bare if percept.evidence > SURE]
-        if conscious:
-            self._primed.feed(_broadcast(view, conscious))
-        return bare, primed
-
-    def _view(self, scene: Scene) -> View:
-        self._frame += 1
-        stamp_ns = self._frame * PERIOD_NS
-        frame = StereoFrame(
-            stamp_ns=stamp_ns,
-            frame=self._frame,
-            left=Array.of(scene.left),
-            right=Array.of(scene.right),
-            calibration=self._camera,
-        )
-        still = Odometry(stamp_ns=stamp_ns, speed_m_s=0.0, turn_rate_rad_s=0.0, dt_s=0.4)
-        self._sensory.feed(still)
-        return next(each for each in self._sensory.feed(frame) if isinstance(each, View))
-
-
-def _percepts(epam: Module, view: View) -> list[Percept]:
-    found = next(each for each in epam.feed(view) if isinstance(each, Percepts))
-    return found.objects
 
 
 def _broadcast(view: View, conscious: Sequence[Percept]) -> Broadcast:
@@ -169,23 +149,15 @@ def _broadcast(view: View, conscious: Sequence[Percept]) -> Broadcast:
     )
 
 
-def _laps(place: town.Town, rng: np.random.Generator) -> list[Pose]:
-    poses: list[Pose] = []
-    for _ in range(LAPS):
-        poses += sequence.poses(place.line(), rng, STEPS_M, OFFSET_M, TURN_RAD)
-    return poses
-
-
 def _compared(
     scene: Scene,
-    kinds: Sequence[str],
     place: town.Town,
     bare: Sequence[Percept],
     primed: Sequence[Percept],
 ) -> Iterator[Naming]:
     """The buildings that the extended PAM without priming has a percept of."""
-    here = np.array([scene.pose.x_m, scene.pose.y_m])
-    range_m = [float(np.hypot(*(here - (plot.x_m, plot.y_m)))) for plot in place.plots]
+    kinds = [plot.kind.name for plot in place.plots]
+    range_m = side_and_range(place, scene.pose)[:, 1].tolist()
     without = sight(claims(bare, scene.label.shape), scene.label, kinds, range_m)
     with_it = sight(claims(primed, scene.label.shape), scene.label, kinds, range_m)
 

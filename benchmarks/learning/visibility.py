@@ -8,12 +8,12 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.robot import calibration
-from cogmap.services.sim.driven.camera import NOTHING, ColumnCamera
-from cogmap.services.sim.driven.sensors import MIN_COLUMNS
-from cogmap.services.sim.driven.surroundings import Surroundings
 from cogmap.services.sim.layout.barriers import barriers
 from cogmap.services.sim.layout.boundaries import outlines
 from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.percept_level.column_camera import NOTHING, ColumnCamera
+from cogmap.services.sim.percept_level.surroundings import Surroundings
+from cogmap.services.sim.percept_level.town_sensors import MIN_COLUMNS
 
 
 class Visibility:

@@ -56,7 +56,7 @@ class Courier(TownObserver):
         return [Offer(cycle=self.graph.cycle, operations=[*operations, goal])]
 
     def _next_lap(self, town: TrueTown, here_m: Point) -> list[Point]:
-        """The places of the lap that begins."""
+        """Return the places of the lap that begins."""
         drivable = Drivable.of(town)
         while len(self._stops) < STOPS:
             stop_m, _ = draw_goal(self._rng, town, drivable, here_m)

@@ -1,4 +1,4 @@
-"""What a cycle costs after days of driving over what it cost early, and what became of the map."""
+"""The cost of a cycle after days of driving over its cost early, and the error of the map."""
 
 from __future__ import annotations
 

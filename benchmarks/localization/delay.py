@@ -1,4 +1,4 @@
-"""How long after a command the wheels turn, estimated from the robot's own senses as it drives."""
+"""The delay from a command to the wheels' turn, estimated from the senses as the robot drives."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
-"""One robot's log through the loop, and how far what it believes is from motion capture's truth."""
+"""One robot's log through the loop, and the errors of its estimates by motion capture."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +25,7 @@ STAMP_TOLERANCE_S = 1e-6
 
 
 class Drive(NamedTuple):
-    """What was believed of a drive: (n, 3) poses `online` and by path integration at each moment.
+    """The estimates on a drive: (n, 3) poses `online` and by path integration at each moment.
 
     `path` (m, 7) is the path on the map in the end: stamp_s, pose, pose by path integration.
     `late_answers` is how many answers of background codelets came too late to be committed.
@@ -37,7 +37,7 @@ class Drive(NamedTuple):
     late_answers: int
 
     def corrected(self, stamps_s: Floats) -> Floats:
-        """(n, 3) poses at the moments as the map has them in the end.
+        """Return (n, 3) poses at the moments as the map has them in the end.
 
         Each is by path integration from the last place of the path before it.
         """
@@ -80,50 +80,32 @@ def follow(
 
 
 def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics:
-    """The errors of one robot, each the mean over SEEDS.
+    """Return the errors of one robot, each the mean over SEEDS.
 
     `slam_rmse_m` is of the path as the map has it in the end, as the smoother's is;
-    `slam_online_rmse_m` of what was believed at each moment, before later observations corrected
-    it. `*_even_m` is of the moments at even times alone.
+    `slam_online_rmse_m` of the estimate at each moment, before later observations corrected it.
+    `*_even_m` is of the moments at even times alone.
     """
     log = list(moments(robot))
-    truth = Truth.at(robot, _stamps_s(log))
-    is_tick = np.array([moment.tick for moment in log])
-    even = truth.only(is_tick)
-    start = _start(robot)
+    stamps_s = np.array([moment.stamp_s for moment in log])
+    truth = Truth.at(robot, stamps_s)
+    even = truth.only(np.array([moment.tick for moment in log]))
+    start_x_m, start_y_m, start_rad = Truth.at(robot, robot.odometry[:1, 0]).poses[0].tolist()
 
-    known = [follow(log, landmarks, start, seed).online for seed in SEEDS]
-    metrics = {
+    known = []
+    mapping = []
+    for seed in SEEDS:
+        known.append(follow(log, landmarks, (start_x_m, start_y_m, start_rad), seed).online)
+        mapping.append(follow(log, {}, ORIGIN, seed))
+
+    in_the_end_m = [truth.aligned_error_m(drive.corrected(stamps_s)) for drive in mapping]
+    online_m = [truth.aligned_error_m(drive.online) for drive in mapping]
+    return {
         "known_map_rmse_m": float(np.mean([truth.rmse_m(path) for path in known])),
         "known_map_rmse_even_m": float(np.mean([even.rmse_m(path) for path in known])),
-    }
-    return metrics | _mapping_errors(log, truth)
-
-
-def _mapping_errors(log: Sequence[Moment], truth: Truth) -> Metrics:
-    """The errors of paths on a map of the robot's own, and of path integration and the smoother."""
-    stamps_s = _stamps_s(log)
-    drives = [follow(log, {}, ORIGIN, seed) for seed in SEEDS]
-    in_the_end_m = [truth.aligned_error_m(drive.corrected(stamps_s)) for drive in drives]
-    online_m = [truth.aligned_error_m(drive.online) for drive in drives]
-    smoothed = smoother.smooth(log)
-
-    return {
         "slam_rmse_m": float(np.mean(in_the_end_m)),
         "slam_online_rmse_m": float(np.mean(online_m)),
-        "path_integration_rmse_m": truth.aligned_error_m(drives[0].odometry),
-        "smoother_rmse_m": truth.aligned_error_m(smoothed),
-        "late_answers": float(sum(drive.late_answers for drive in drives)),
+        "path_integration_rmse_m": truth.aligned_error_m(mapping[0].odometry),
+        "smoother_rmse_m": truth.aligned_error_m(smoother.smooth(log)),
+        "late_answers": float(sum(drive.late_answers for drive in mapping)),
     }
-
-
-def _stamps_s(log: Sequence[Moment]) -> Floats:
-    return np.array([moment.stamp_s for moment in log])
-
-
-def _start(robot: Robot) -> tuple[float, float, float]:
-    """The true pose at the beginning of the log."""
-    begin_s = robot.odometry[:1, 0]
-    poses = Truth.at(robot, begin_s).poses
-    x_m, y_m, heading_rad = poses[0].tolist()
-    return x_m, y_m, heading_rad

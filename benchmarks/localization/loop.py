@@ -7,19 +7,30 @@ from typing import cast
 
 import numpy as np
 
-from benchmarks.localization import nodes
 from benchmarks.localization.senses import Moment
 from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from cogmap.runtime.config import Sections
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Handler, Module
 from cogmap.schemas import topics
-from cogmap.schemas.array import Array
+from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Proposal
-from cogmap.schemas.graph import Delta
+from cogmap.schemas.graph import Decay, Delta, Snapshot
+from cogmap.schemas.nodes import (
+    ROOT_MAP,
+    SELF_ID,
+    AnyNode,
+    Map,
+    Object,
+    PathIntegration,
+    PathSegment,
+    Self,
+    object_id,
+)
 from cogmap.schemas.sensing import Percepts, SelfMotion
 from cogmap.services import registry
 from cogmap.services.codelets.localization import landmarks, localization
@@ -36,13 +47,17 @@ NEVER_S = 1e9
 CYCLES_A_SEED = 1_000_000
 LOCALIZATION = localization.CODELET.name
 LANDMARK = landmarks.CODELET.name
+CERTAIN_M = 1e-3
+LANDMARK_SAMPLES = 50
+KNOWN_SIGHTINGS = 100
+Pose = tuple[float, float, float]
 LATE = " is late: "
-"""How the workspace begins the reason for a late answer, after its name."""
+"""The workspace puts it into the reason for a late answer, after the answer's name."""
 Landmarks = dict[str, tuple[float, float]]
 
 
 def sections(surveyed: bool) -> Sections:
-    """The configuration of both modules; no loop is closed on a map that was surveyed."""
+    """Configure both modules; no loop is closed on a map that was surveyed."""
     codelets = {
         "samples": SAMPLES,
         "kept_samples": 100,
@@ -74,6 +89,44 @@ def sections(surveyed: bool) -> Sections:
     }
 
 
+def initial_map(start: Pose, landmarks: Landmarks, surveyed: bool, cycle: int) -> Snapshot:
+    """Return a map with the agent at `start`, for certain, and `landmarks` by label at theirs.
+
+    `surveyed` landmarks stay where they are for good. Codelets draw their samples by the number of
+    the cycle, so runs that begin at another `cycle` have other noise.
+    """
+    x_m, y_m, heading_rad = start
+    agent = Self(
+        id=SELF_ID,
+        activation=1.0,
+        base_level=1.0,
+        x_m=x_m,
+        y_m=y_m,
+        heading_rad=heading_rad,
+        odometry=PathIntegration(x_m=x_m, y_m=y_m, heading_rad=heading_rad),
+        samples=Matrix.of(np.tile(np.array(start), (SAMPLES, 1))),
+    )
+    nodes: list[AnyNode] = [Map(id=ROOT_MAP, cell_m=1.0), agent]
+    offsets_m = np.random.default_rng(0).normal(0.0, CERTAIN_M, (LANDMARK_SAMPLES, 2))
+
+    for label, (x_m, y_m) in landmarks.items():
+        landmark = Object(
+            id=object_id(label),
+            activation=1.0,
+            base_level=1.0,
+            cycle=cycle,
+            label=label,
+            x_m=x_m,
+            y_m=y_m,
+            surveyed=surveyed,
+            sightings=KNOWN_SIGHTINGS,
+            offsets_m=Matrix.of(offsets_m, "<f2"),
+        )
+        nodes.append(landmark)
+
+    return Snapshot(version=1, cycle=cycle, decay=Decay(), nodes=nodes, links=[], tiles=[])
+
+
 class LocalizationLoop:
     """Runs both modules on the in-memory bus, one cognitive cycle for each moment of a log.
 
@@ -84,7 +137,7 @@ class LocalizationLoop:
 
     def __init__(
         self,
-        start: nodes.Pose,
+        start: Pose,
         landmarks: Landmarks | None = None,
         surveyed: bool = False,
         seed: int = 0,
@@ -96,61 +149,23 @@ class LocalizationLoop:
         self._frame = 0
         self._until_ns = 0
 
-        self._senses = Module("senses")
-        self._senses.emits.update((topics.SELF_MOTION, topics.PERCEPTS))
-
         configured = sections(surveyed)
-        first_cycle = seed * CYCLES_A_SEED
-        initial = nodes.initial_map(start, landmarks or {}, surveyed, SAMPLES, first_cycle)
         workspace = registry.build("workspace", configured)
         if workspace.restore is not None:
-            workspace.restore([initial])
+            first_cycle = seed * CYCLES_A_SEED
+            workspace.restore([initial_map(start, landmarks or {}, surveyed, first_cycle)])
 
-        worker = self._worker(configured)
+        worker = registry.build("codelets", configured)
+        for topic in (topics.TASK, topics.LEASES):  # it begins with whichever comes later
+            worker.handlers[topic] = self._timed(worker.handlers[topic])
+
         observer = Module("observer").following(self._graph, self.count_rejected)
+        self._senses = Module("senses")
+        self._senses.emits.update((topics.SELF_MOTION, topics.PERCEPTS))
         self._runner = InProcessRunner([workspace, worker, observer, self._senses])
 
     def live(self, moment: Moment) -> None:
         """Run one cycle. Raises CogmapError if an answer was rejected that was not late."""
-        self.task_s = []
-        senses = self._runner.shells[-1]
-        sensed = self._messages(moment)
-        senses.publish(self._senses.stamp(sensed))
-        self._runner.run()
-
-        for shell in self._runner.shells:
-            self._rejected += [str(reason) for reason in shell.intake.rejected]
-        if self._rejected:
-            raise CogmapError(f"the cycle at {moment.stamp_s} s lost answers: {self._rejected}")
-
-    def close(self) -> None:
-        """End the modules."""
-        self._runner.close()
-
-    @property
-    def pose(self) -> Floats:
-        """(3,): where the agent believes that it is."""
-        return nodes.pose(self._graph)
-
-    @property
-    def odometry(self) -> Floats:
-        """(3,): where path integration alone would have the agent."""
-        return nodes.odometry(self._graph)
-
-    @property
-    def path(self) -> Floats:
-        """(n, 11) rows of the path on the map now, see PathColumn."""
-        return nodes.path(self._graph)
-
-    def _worker(self, configured: Sections) -> Module:
-        """The codelets' module, whose tasks are timed."""
-        worker = registry.build("codelets", configured)
-        for topic in (topics.TASK, topics.LEASES):  # it begins with whichever comes later
-            worker.handlers[topic] = self._timed(worker.handlers[topic])
-        return worker
-
-    def _messages(self, moment: Moment) -> list[SelfMotion | Percepts]:
-        """The next frame's self-motion and percepts."""
         stamp_ns = round(moment.stamp_s * 1e9)
         motion = SelfMotion(
             stamp_ns=stamp_ns,
@@ -166,7 +181,41 @@ class LocalizationLoop:
         )
         self._frame += 1
         self._until_ns = stamp_ns
-        return [motion, percepts]
+
+        self.task_s = []
+        self._runner.shells[-1].publish(self._senses.stamp([motion, percepts]))
+        self._runner.run()
+
+        for shell in self._runner.shells:
+            self._rejected += [str(reason) for reason in shell.intake.rejected]
+        if self._rejected:
+            raise CogmapError(f"the cycle at {moment.stamp_s} s lost answers: {self._rejected}")
+
+    def close(self) -> None:
+        """End the modules."""
+        self._runner.close()
+
+    @property
+    def pose(self) -> Floats:
+        """(3,): the mean of the self's samples."""
+        agent = self._agent
+        return np.array([agent.x_m, agent.y_m, agent.heading_rad])
+
+    @property
+    def odometry(self) -> Floats:
+        """(3,): the agent's pose by path integration alone."""
+        return self._agent.odometry.pose()
+
+    @property
+    def path(self) -> Floats:
+        """(n, 11) rows of the path on the map now, see PathColumn."""
+        return rows_of(self._graph.of_kind(PathSegment))
+
+    @property
+    def _agent(self) -> Self:
+        if self._graph.agent is None:
+            raise CogmapError("the graph has no self node")
+        return self._graph.agent
 
     def count_rejected(self, delta: Delta) -> None:
         """Count the late answers that a delta names, and keep why others were rejected."""

@@ -1,4 +1,4 @@
-"""How soon a robot knows again where it is, after a part of its log was cut out."""
+"""The time until a robot is localized again after a part of its log was cut out."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.localization.drives import follow
-from benchmarks.localization.senses import Moment, moments
+from benchmarks.localization.senses import moments
 from benchmarks.localization.truth import Truth
 from benchmarks.report import Metrics
 from cogmap.data.mrclam import Robot
@@ -23,7 +23,7 @@ HOLDS_S = 20.0
 
 class Recovery(NamedTuple):
     """After one cut: the time until the error is below FOUND_M for HOLDS_S, and how much of the
-    time after that it is above; all of the time that was watched where it never is.
+    time after that it is above; all of the time that was watched if it never is.
     """
 
     lost_s: float
@@ -69,22 +69,16 @@ def _recovery(robot: Robot, landmarks: dict[int, tuple[float, float]], cut_s: fl
     """
     begin_s = float(robot.odometry[0, 0])
     resumed_s = begin_s + cut_s + CUT_S
-    log = _around(robot, cut_s)
+    first_s = begin_s + cut_s - LEAD_S
+    last_s = resumed_s + WATCHED_S
+    every = moments(robot, (cut_s, cut_s + CUT_S))
+    log = [moment for moment in every if first_s <= moment.stamp_s <= last_s]
     stamps_s = np.array([moment.stamp_s for moment in log])
 
     truth = Truth.at(robot, stamps_s)
-    start_x_m, start_y_m, start_rad = Truth.at(robot, stamps_s[:1]).poses[0].tolist()
+    start_x_m, start_y_m, start_rad = truth.poses[0].tolist()
     online = follow(log, landmarks, (start_x_m, start_y_m, start_rad), 0).online
 
     is_tick = np.array([moment.tick for moment in log])
     after = truth.only(is_tick & (stamps_s > resumed_s))
     return recovery_of(stamps_s[after.is_known] - resumed_s, after.errors_m(online))
-
-
-def _around(robot: Robot, cut_s: float) -> list[Moment]:
-    """The moments of a log from LEAD_S before a cut until WATCHED_S after it."""
-    begin_s = float(robot.odometry[0, 0])
-    first_s = begin_s + cut_s - LEAD_S
-    last_s = begin_s + cut_s + CUT_S + WATCHED_S
-    log = moments(robot, (cut_s, cut_s + CUT_S))
-    return [moment for moment in log if first_s <= moment.stamp_s <= last_s]

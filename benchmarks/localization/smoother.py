@@ -1,9 +1,8 @@
-"""What mapping is compared with: a batch smoother of gtsam's, which gets the whole log at once."""
+"""The peer of mapping: a batch smoother of gtsam's, which gets the whole log at once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -19,10 +18,10 @@ CAUCHY = 2.0
 
 
 def smooth(moments: Sequence[Moment]) -> Floats:
-    """(n, 3) poses at the moments that fit all percepts and motions best; the start is at 0.
+    """Return (n, 3) poses at the moments that fit all percepts and motions best; the start is at 0.
 
     Levenberg-Marquardt on the same percepts, motions and noise that the codelets get; landmarks are
-    unknown. Raises UsageError where gtsam is not installed.
+    unknown. Raises UsageError if gtsam is not installed.
     """
     problem = Problem()
 
@@ -79,10 +78,14 @@ class Problem:
         return optional.gtsam_poses(optimizer.optimize(), keys)
 
     def _observe(self, here: int, percept: Percept) -> None:
+        models = self._gtsam.noiseModel
+        sds = np.array([percept.bearing_sd_rad, percept.range_sd_m])
+        cauchy = models.mEstimator.Cauchy.Create(CAUCHY)
+        noise = models.Robust.Create(cauchy, models.Diagonal.Sigmas(sds))
+
         _, _, number = percept.label.rpartition("-")
         landmark = self._gtsam.symbol("l", int(number))
         bearing = self._gtsam.Rot2(percept.bearing_rad)
-        noise = self._robust_noise(percept)
         factor = self._gtsam.BearingRangeFactor2D(here, landmark, bearing, percept.range_m, noise)
         self._graph.add(factor)
 
@@ -90,16 +93,7 @@ class Problem:
             cosine = np.cos(percept.bearing_rad)
             sine = np.sin(percept.bearing_rad)
             offset_m = percept.range_m * np.array([cosine, sine])
-            where = self._pose.transformFrom(offset_m)
-            self._start.insert(landmark, where)
-
-    def _robust_noise(self, percept: Percept) -> Any:
-        """The noise of bearing and range, weighed by Cauchy's function."""
-        models = self._gtsam.noiseModel
-        sds = np.array([percept.bearing_sd_rad, percept.range_sd_m])
-        gaussian = models.Diagonal.Sigmas(sds)
-        cauchy = models.mEstimator.Cauchy.Create(CAUCHY)
-        return models.Robust.Create(cauchy, gaussian)
+            self._start.insert(landmark, self._pose.transformFrom(offset_m))
 
     def _key(self, number: int) -> int:
         key: int = self._gtsam.symbol("x", number)
@@ -117,13 +111,8 @@ def _step(rows: Floats) -> tuple[Floats, Floats]:
     left_m = distance_m * np.sin(middle_rad)
     step = np.array([forwards_m.sum(), left_m.sum(), turn_rad.sum()])
 
-    distance_sd_m = _root_sum_square(speed_sd * dt)
-    turn_sd_rad = _root_sum_square(turn_rate_sd * dt)
+    # Of sums of independent terms.
+    distance_sd_m = np.sqrt(np.square(speed_sd * dt).sum())
+    turn_sd_rad = np.sqrt(np.square(turn_rate_sd * dt).sum())
     sds = np.array([distance_sd_m, SIDEWAYS_SHARE * distance_sd_m, turn_sd_rad])
     return step, sds + MIN_SD
-
-
-def _root_sum_square(deviations: Floats) -> float:
-    """The standard deviation of a sum of independent terms."""
-    variances = np.square(deviations)
-    return float(np.sqrt(variances.sum()))

@@ -1,4 +1,4 @@
-"""How much compute an update takes, and whether it takes more on a larger map."""
+"""The CPU time of an update, and its ratio on a large map to that on a small one."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from benchmarks import optional
 from benchmarks.localization.loop import LANDMARK, LOCALIZATION, LocalizationLoop
 from benchmarks.localization.senses import BEARING_SD_RAD, RANGE_NOISE, Moment, label_of, seen
 from benchmarks.report import Metrics
-from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import Percept
 
 IN_VIEW = 10
@@ -61,20 +60,6 @@ class Circle:
 
     def update_s(self) -> Times:
         """Drive a step and look."""
-        self._loop.live(self._next())
-
-        of_codelet: dict[str, float] = defaultdict(float)
-        for codelet, took_s in self._loop.task_s:
-            of_codelet[codelet] += took_s
-
-        return Times(of_codelet[LOCALIZATION], of_codelet[LANDMARK], sum(of_codelet.values()))
-
-    def close(self) -> None:
-        """End its modules."""
-        self._loop.close()
-
-    def _next(self) -> Moment:
-        """Move on by STEP_S: the motion, and what is seen from there."""
         turn_rad = TURN_RATE_RAD_S * STEP_S
         distance_m = SPEED_M_S * STEP_S
         middle_rad = self._pose[2] + turn_rad / 2
@@ -86,31 +71,35 @@ class Circle:
         speed_sd = NOISE_SHARE * SPEED_M_S
         turn_rate_sd = NOISE_SHARE * TURN_RATE_RAD_S
         motion = [SPEED_M_S, TURN_RATE_RAD_S, STEP_S, speed_sd, turn_rate_sd]
-        return Moment(self._time_s, np.array([motion]), self._percepts(), True)
+        self._loop.live(Moment(self._time_s, np.array([motion]), self._percepts(), True))
+
+        of_codelet: dict[str, float] = defaultdict(float)
+        for codelet, took_s in self._loop.task_s:
+            of_codelet[codelet] += took_s
+
+        return Times(of_codelet[LOCALIZATION], of_codelet[LANDMARK], sum(of_codelet.values()))
+
+    def close(self) -> None:
+        """End its modules."""
+        self._loop.close()
 
     def _percepts(self) -> list[Percept]:
         """Some of the nearest landmarks, as many as are drawn, up to IN_VIEW."""
         offsets_m = self._near_m - self._pose[:2]
-        x_m, y_m = offsets_m.T
-        nearest = np.argsort(np.hypot(x_m, y_m))
+        nearest = np.argsort(np.hypot(*offsets_m.T))
         count = self._rng.integers(1, IN_VIEW + 1)
-
         percepts = []
+
         for number in nearest[:count].tolist():
-            percept = self._percept(number, offsets_m[number])
-            percepts.append(percept)
+            x_m, y_m = offsets_m[number].tolist()
+            direction_rad = math.atan2(y_m, x_m) - self._pose[2]
+            bearing_rad = direction_rad + self._rng.normal(0.0, BEARING_SD_RAD)
+            distance_m = math.hypot(x_m, y_m)
+            range_m = max(MIN_RANGE_M, self._rng.normal(distance_m, RANGE_NOISE * distance_m))
+            wrapped_rad = math.remainder(bearing_rad, math.tau)
+            percepts.append(seen(label_of(number), wrapped_rad, range_m))
 
         return percepts
-
-    def _percept(self, number: int, offset_m: Floats) -> Percept:
-        x_m, y_m = offset_m.tolist()
-        direction_rad = math.atan2(y_m, x_m) - self._pose[2]
-        bearing_rad = direction_rad + self._rng.normal(0.0, BEARING_SD_RAD)
-        wrapped_rad = math.remainder(bearing_rad, math.tau)
-
-        distance_m = math.hypot(x_m, y_m)
-        range_m = self._rng.normal(distance_m, RANGE_NOISE * distance_m)
-        return seen(label_of(number), wrapped_rad, max(MIN_RANGE_M, range_m))
 
 
 def _drive_both(small: Circle, large: Circle) -> tuple[list[Times], Times]:
@@ -125,7 +114,7 @@ def measure() -> Metrics:
     `update_ms_*` is of the localization codelet alone, on the small map; the ratio is of all tasks
     of a cycle. Linear algebra has one thread, as in processes of the system.
 
-    Raises UsageError where threadpoolctl is not installed.
+    Raises UsageError if threadpoolctl is not installed.
     """
     small = Circle(SMALL)
     large = Circle(LARGE)

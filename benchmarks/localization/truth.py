@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from benchmarks.trajectory import trajectory_error_m
+from benchmarks.optional import trajectory_error_m
 from cogmap.data.mrclam import Robot
 from cogmap.geometry.arrays import Booleans, Floats
 

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.map_correction.files import read_truth
+from benchmarks.optional import trajectory_error_m
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from benchmarks.trajectory import trajectory_error_m
 from cogmap.cli.progress import bar
 from cogmap.errors import UsageError
 from cogmap.estimation.gnc import inliers
@@ -77,7 +77,7 @@ def measure(graph: PoseGraph, graph_path: Path, truth_path: Path | None, process
 
 
 def _kept(groups: Groups, graph: PoseGraph) -> tuple[Booleans, Floats]:
-    """Which closures are inliers, the graph's own before the false ones, and the path by those."""
+    """Return the mask of inliers, the graph's own before the false ones, and the path by them."""
     count, size = groups
     rng = np.random.default_rng([SEED, count, size])
     closures = graph.closures + false_closures(graph, count, size, rng)

@@ -12,10 +12,10 @@ from benchmarks.benchmark import PROCESSES, Setting, path_option
 from benchmarks.map_correction import false_groups
 from benchmarks.map_correction.files import read_graph, read_truth
 from benchmarks.map_correction.reference import Gtsam, best_positions
+from benchmarks.optional import trajectory_error_m
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from benchmarks.timing import timed
-from benchmarks.trajectory import trajectory_error_m
 from cogmap.cli.progress import bar
 from cogmap.estimation.incremental import IncrementalSolver
 from cogmap.estimation.least_squares import optimize

@@ -1,4 +1,4 @@
-"""What map correction is compared with: exact least squares for positions, gtsam for poses."""
+"""The peers of map correction: exact least squares for positions, gtsam for poses."""
 
 from __future__ import annotations
 
@@ -15,9 +15,17 @@ from cogmap.geometry.arrays import Floats
 
 
 def best_positions(graph: PoseGraph) -> Floats:
-    """(n, 2) positions that minimise eq. 7 exactly; headings and the first position stay."""
+    """Return (n, 2) positions that minimise eq. 7 exactly; headings and the first position stay."""
     known = displacements(graph.poses, graph.constraints)
-    differences = _differences(graph.constraints, len(graph.poses))
+
+    # (2m, 2(n - 1)): takes all positions but the first to the m differences between two each.
+    number = len(graph.constraints)
+    rows = np.tile(np.arange(number), 2)
+    columns = np.concatenate([graph.constraints.j, graph.constraints.i])
+    signs = np.repeat([1.0, -1.0], number)
+    of_one_axis = sparse.csr_matrix((signs, (rows, columns)), shape=(number, len(graph.poses)))
+    differences = sparse.kron(of_one_axis[:, 1:], sparse.identity(2), format="csc")
+
     covariance = sparse.block_diag(known.covariance_m2, format="csc")
 
     # Forces and positions together: the normal equations lose what a certain constraint leaves to
@@ -35,20 +43,8 @@ def best_positions(graph: PoseGraph) -> Floats:
     return positions_m
 
 
-def _differences(constraints: Constraints, count: int) -> sparse.csc_matrix:
-    """(2m, 2(n - 1)): takes all positions but the first to the m differences between two each."""
-    number = len(constraints)
-    rows = np.tile(np.arange(number), 2)
-    columns = np.concatenate([constraints.j, constraints.i])
-    signs = np.repeat([1.0, -1.0], number)
-
-    of_one_axis = sparse.csr_matrix((signs, (rows, columns)), shape=(number, count))
-    without_first = of_one_axis[:, 1:]
-    return sparse.kron(without_first, sparse.identity(2), format="csc")
-
-
 class Gtsam:
-    """The same graph for gtsam. Raises UsageError where gtsam is not installed."""
+    """The same graph for gtsam. Raises UsageError if gtsam is not installed."""
 
     def __init__(self, poses: Floats, constraints: Constraints) -> None:
         self._gtsam = optional.gtsam()
@@ -66,8 +62,16 @@ class Gtsam:
         prior = self._gtsam.PriorFactorPose2(0, first, fixed)
         self._graph.add(prior)
 
-        for number in range(len(constraints)):
-            self._constrain(constraints, number)
+        for i, j, measurement, information in zip(
+            constraints.i.tolist(),
+            constraints.j.tolist(),
+            constraints.measurement,
+            constraints.information,
+            strict=True,
+        ):
+            noise = self._gtsam.noiseModel.Gaussian.Information(information)
+            between = self._gtsam.Pose2(*measurement)
+            self._graph.add(self._gtsam.BetweenFactorPose2(i, j, between, noise))
 
     def solve(self) -> Any:
         """Levenberg and Marquardt's method, with gtsam's defaults; `poses` reads the result."""
@@ -90,14 +94,5 @@ class Gtsam:
         return gives_up
 
     def poses(self, values: Any) -> Floats:
-        """(n, 3) poses of a result of `solve`."""
+        """Return (n, 3) poses of a result of `solve`."""
         return optional.gtsam_poses(values, range(self._count))
-
-    def _constrain(self, constraints: Constraints, number: int) -> None:
-        i = int(constraints.i[number])
-        j = int(constraints.j[number])
-        measurement = self._gtsam.Pose2(*constraints.measurement[number])
-        information = constraints.information[number]
-        noise = self._gtsam.noiseModel.Gaussian.Information(information)
-        factor = self._gtsam.BetweenFactorPose2(i, j, measurement, noise)
-        self._graph.add(factor)

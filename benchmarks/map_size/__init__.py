@@ -1,1 +1,1 @@
-"""How compute, traffic and memory depend on the size of the map."""
+"""Compute, traffic and memory on maps of different sizes."""

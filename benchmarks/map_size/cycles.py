@@ -55,7 +55,6 @@ def sections() -> Sections:
     sim = {
         "trajectory": trajectory,
         "frame_hz": 1,
-        "odometry_hz": 5,
     }
     return {
         "run": {"lockstep": True, "participants": dict.fromkeys(PARTICIPANTS, 1)},

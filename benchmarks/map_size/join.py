@@ -60,19 +60,15 @@ def _hold(connection: Connection) -> None:
     payload = connection.recv_bytes()
     before = _resident_bytes() - len(payload)
 
+    snapshot = decode(topics.SNAPSHOT, payload)
+    assert isinstance(snapshot, Snapshot)
     graph = Graph()
-    graph.load(_decoded(payload))
-    del payload
+    graph.load(snapshot)
+    del payload, snapshot
 
     gc.collect()
     grown = _resident_bytes() - before
     connection.send(grown / 1e6)
-
-
-def _decoded(payload: bytes) -> Snapshot:
-    snapshot = decode(topics.SNAPSHOT, payload)
-    assert isinstance(snapshot, Snapshot)
-    return snapshot
 
 
 def _resident_bytes() -> int:
@@ -82,7 +78,7 @@ def _resident_bytes() -> int:
 
 
 def join(learned: Snapshot) -> Joined:
-    """Measure a worker of its own process. Raises CogmapError where it answers nothing in time."""
+    """Measure a worker of its own process. Raises CogmapError if it answers nothing in time."""
     endpoint = free_endpoint()
     router = open_router(endpoint)
     configured = sections()
@@ -90,27 +86,29 @@ def join(learned: Snapshot) -> Joined:
     if workspace.restore is not None:
         workspace.restore([learned])
 
+    # A view of nothing, and the motion up to it.
+    stamp_ns = 1_000_000_000
+    motions = Array.of(np.array([[1.0, 0.0, 1.0, 0.1, 0.01]]))
+    motion = SelfMotion(stamp_ns=stamp_ns, frame=0, since_ns=0, motions=motions)
+    no_road_m = Array.of(np.zeros((0, 2), np.float32))
+    percepts = Percepts(stamp_ns=stamp_ns, frame=0, objects=[], road_m=no_road_m)
+
+    module = Module("senses")
+    module.emits.update((topics.SELF_MOTION, topics.PERCEPTS))
     shell = Shell(workspace, ZenohBus(endpoint, AGENT), health=False)
-    senses = Shell(_senses(), ZenohBus(endpoint, AGENT), health=False)
+    senses = Shell(module, ZenohBus(endpoint, AGENT), health=False)
     shell.open()
     senses.open()
-    senses.publish(senses.module.stamp(_first_view()))
+    senses.publish(module.stamp([motion, percepts]))
 
     ended = threading.Event()
-    thread = threading.Thread(target=_serve, args=(shell, ended))
+
+    def serve() -> None:
+        while not ended.is_set():
+            shell.spin_once(PERIOD_S)
+
+    thread = threading.Thread(target=serve)
     thread.start()
-    try:
-        return _join_late(endpoint)
-    finally:
-        ended.set()
-        thread.join()
-        senses.close()
-        shell.close()
-        router.close()  # type: ignore[no-untyped-call]
-
-
-def _join_late(endpoint: str) -> Joined:
-    """Start the worker's process, and wait until it has answered."""
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     worker = context.Process(target=_work, args=(endpoint, theirs))
@@ -123,41 +121,16 @@ def _join_late(endpoint: str) -> Joined:
     finally:
         worker.terminate()
         worker.join()
+        ended.set()
+        thread.join()
+        senses.close()
+        shell.close()
+        router.close()  # type: ignore[no-untyped-call]
 
 
-def _senses() -> Module:
-    module = Module("senses")
-    module.emits.update((topics.SELF_MOTION, topics.PERCEPTS))
-    return module
-
-
-def _first_view() -> list[SelfMotion | Percepts]:
-    """A view of nothing, and the motion up to it."""
-    stamp_ns = 1_000_000_000
-    motions = np.array([[1.0, 0.0, 1.0, 0.1, 0.01]])
-    motion = SelfMotion(
-        stamp_ns=stamp_ns,
-        frame=0,
-        since_ns=0,
-        motions=Array.of(motions),
-    )
-    no_road_m = np.zeros((0, 2), np.float32)
-    percepts = Percepts(
-        stamp_ns=stamp_ns,
-        frame=0,
-        objects=[],
-        road_m=Array.of(no_road_m),
-    )
-    return [motion, percepts]
-
-
-def _serve(shell: Shell, ended: threading.Event) -> None:
-    while not ended.is_set():
-        shell.spin_once(PERIOD_S)
-
-
-def _watch_answers(module: Module) -> threading.Event:
-    """Set once a handler of the module has answered something."""
+def _work(endpoint: str, connection: Connection) -> None:
+    """The process of the worker, which ends once a handler has answered something."""
+    module = registry.build("codelets", sections(), "codelets-late")
     answered = threading.Event()
 
     def watched(handler: Handler) -> Handler:
@@ -172,13 +145,6 @@ def _watch_answers(module: Module) -> threading.Event:
     for topic, handler in module.handlers.items():
         module.handlers[topic] = watched(handler)
 
-    return answered
-
-
-def _work(endpoint: str, connection: Connection) -> None:
-    """The process of the worker."""
-    module = registry.build("codelets", sections(), "codelets-late")
-    answered = _watch_answers(module)
     gc.collect()
     before = _resident_bytes()
 

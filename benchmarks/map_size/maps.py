@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.graph import Decay, Links, PlaceTile, Snapshot
@@ -37,7 +36,7 @@ CLEAR_M = 150.0
 
 @dataclass(frozen=True)
 class Size:
-    """How much a map holds: objects, and place nodes, rounded up to whole tiles."""
+    """The size of a map: objects, and place nodes, rounded up to whole tiles."""
 
     objects: int
     places: int
@@ -48,8 +47,8 @@ LARGE = Size(objects=100_000, places=500_000)
 
 
 def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
-    """A map as of `cycle`: every object with as many samples as the codelets keep and linked to its
-    place, every place node with all columns, the coarse maps, and the places of sub-maps.
+    """Return a map as of `cycle`: every object with as many samples as the codelets keep and linked
+    to its place, every place node with all columns, the coarse maps, and the places of sub-maps.
     """
     rng = np.random.default_rng(SEED)
     objects = _objects(size.objects, cycle, rng)
@@ -75,6 +74,7 @@ def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
 
 
 def _objects(number: int, cycle: int, rng: np.random.Generator) -> list[Object]:
+    """Buildings, no number of one quite that of another."""
     samples = Config().landmark_samples
     radius_m = CLEAR_M + 2 * np.sqrt(number)
     positions_m = rng.uniform(-radius_m, radius_m, (number, 2))
@@ -83,32 +83,27 @@ def _objects(number: int, cycle: int, rng: np.random.Generator) -> list[Object]:
 
     objects = []
     for index, (x_m, y_m) in enumerate(positions_m.tolist()):
-        offsets_m = rng.normal(0.0, SPREAD_M, (samples, 2))
-        objects.append(_object(index, x_m, y_m, offsets_m, cycle))
+        label = f"building-{index:06d}"
+        building = Object(
+            id=object_id(label),
+            activation=0.4,
+            base_level=0.9,
+            cycle=cycle,
+            label=label,
+            x_m=x_m,
+            y_m=y_m,
+            x_sd_m=SPREAD_M + index * 1e-9,
+            y_sd_m=SPREAD_M + index * 2e-9,
+            width_m=9.0 + index * 1e-9,
+            height_m=6.0 + index * 1e-9,
+            sightings=5,
+            last_seen_ns=10**12 + index,
+            created_ns=10**11 + index,
+            offsets_m=Matrix.of(rng.normal(0.0, SPREAD_M, (samples, 2)), "<f2"),
+        )
+        objects.append(building)
 
     return objects
-
-
-def _object(index: int, x_m: float, y_m: float, offsets_m: Floats, cycle: int) -> Object:
-    """A building of that `index`; no number of one is quite that of another."""
-    label = f"building-{index:06d}"
-    return Object(
-        id=object_id(label),
-        activation=0.4,
-        base_level=0.9,
-        cycle=cycle,
-        label=label,
-        x_m=x_m,
-        y_m=y_m,
-        x_sd_m=SPREAD_M + index * 1e-9,
-        y_sd_m=SPREAD_M + index * 2e-9,
-        width_m=9.0 + index * 1e-9,
-        height_m=6.0 + index * 1e-9,
-        sightings=5,
-        last_seen_ns=10**12 + index,
-        created_ns=10**11 + index,
-        offsets_m=Matrix.of(offsets_m, "<f2"),
-    )
 
 
 def _sub_maps(objects: list[Object]) -> tuple[list[Map], Links]:
@@ -119,31 +114,28 @@ def _sub_maps(objects: list[Object]) -> tuple[list[Map], Links]:
 
     maps = []
     for number in range(len(occupied)):
-        maps.append(_sub_map(number + 1, positions_m[numbers == number]))
+        members_m = positions_m[numbers == number]
+        low_m = members_m.min(axis=0)
+        high_m = members_m.max(axis=0)
+        x_m, y_m = ((low_m + high_m) / 2).tolist()
+        width_m, height_m = (high_m - low_m).tolist()
+        sub_map = Map(
+            id=map_id(number + 1),
+            base_level=1.0,
+            cell_m=SUB_MAP_CELL_M,
+            parent=ROOT_MAP,
+            x_m=x_m,
+            y_m=y_m,
+            width_m=width_m,
+            height_m=height_m,
+        )
+        maps.append(sub_map)
 
     weights = {}
     for node, number in zip(objects, numbers.tolist(), strict=True):
         weights[node.id] = {map_id(number + 1): 1.0}
 
     return maps, Links(kind=LinkKind.WITHIN, weights=weights)
-
-
-def _sub_map(number: int, members_m: Floats) -> Map:
-    low_m = members_m.min(axis=0)
-    high_m = members_m.max(axis=0)
-    x_m, y_m = ((low_m + high_m) / 2).tolist()
-    width_m, height_m = (high_m - low_m).tolist()
-
-    return Map(
-        id=map_id(number),
-        base_level=1.0,
-        cell_m=SUB_MAP_CELL_M,
-        parent=ROOT_MAP,
-        x_m=x_m,
-        y_m=y_m,
-        width_m=width_m,
-        height_m=height_m,
-    )
 
 
 def _tiles(places: int, rng: np.random.Generator) -> list[PlaceTile]:

@@ -1,19 +1,21 @@
-"""The metrics of map structure: how well sub-maps find districts again, and how fast."""
+"""The metrics of map structure: how well sub-maps find districts, and how fast."""
 
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
 from benchmarks.benchmark import Setting
-from benchmarks.map_structure.peer import adjusted_rand_index, gaussian_mixture
 from benchmarks.map_structure.towns import FUNCTIONS, Town, town
+from benchmarks.optional import scikit_learn
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most, more_than
 from cogmap.experiments.map_structure.boundaries import Boundaries
-from cogmap.geometry.arrays import Indices
+from cogmap.geometry.arrays import Floats, Indices
 from cogmap.services.codelets.sub_maps.config import Config
 from cogmap.services.codelets.sub_maps.sub_maps import SubMaps
 
@@ -32,13 +34,15 @@ CITY_OBJECTS = 10_000
 ARRIVALS = 500
 REPEATS = 3
 ORDER_SEED = 7
+MAX_COMPONENTS = 24
+MAX_ITERATIONS = 1000
 
 WITHOUT: Mapping[str, Config] = {
     "ari_without_position": Config(position_weight=0.0, spacing_weight=0.0),
     "ari_without_function": Config(function_weight=0.0),
     "ari_without_boundary": Config(boundary_weight=0.0),
 }
-"""All but one feature, by the key of what they are worth."""
+"""All but one feature, by the key of their score."""
 
 
 def measure(setting: Setting) -> Metrics:
@@ -50,42 +54,26 @@ def measure(setting: Setting) -> Metrics:
     """
     setting.announce(f"finding the districts of {len(SEEDS)} towns")
     towns = [town(seed) for seed in SEEDS]
-    metrics = _accuracy(towns)
-
-    setting.announce(f"a city of {CITY_OBJECTS} objects")
-    return metrics | _speed()
-
-
-def sub_maps_of(made: Town, config: Config, labels: Indices | None = None) -> SubMaps:
-    """The objects of a town, that are in no sub-map yet, or in those that `labels` name."""
-    return SubMaps(
-        made.positions_m,
-        made.functions,
-        Boundaries(made.boundaries_m),
-        config,
-        kinds=FUNCTIONS,
-        labels=labels,
-    )
-
-
-def _accuracy(towns: list[Town]) -> Metrics:
-    """The adjusted Rand index, mean over towns: of all features, without each, and of the peer; of
-    objects that come one at a time, in the first few.
-    """
     config = Config()
     scores = []
     ratios = []
     peers = []
     for made in towns:
         labels = _settled(made, config)
-        found = len(np.unique(labels))
-        there_are = len(np.unique(made.districts))
-
         scores.append(adjusted_rand_index(made.districts, labels))
-        ratios.append(found / there_are)
+        ratios.append(len(np.unique(labels)) / len(np.unique(made.districts)))
         peers.append(adjusted_rand_index(made.districts, gaussian_mixture(made.positions_m)))
 
-    arriving = [_arriving(made, config) for made in towns[:ONE_AT_A_TIME]]
+    # Objects that come one at a time, in random order.
+    arriving = []
+    for made in towns[:ONE_AT_A_TIME]:
+        order = np.random.default_rng(ORDER_SEED).permutation(len(made.positions_m))
+        sub_maps = sub_maps_of(made.select(order[:1]), config)
+        sub_maps.settle()
+        for index in order[1:].tolist():
+            sub_maps.add(made.positions_m[index], int(made.functions[index]))
+        arriving.append(adjusted_rand_index(made.districts[order], sub_maps.labels))
+
     metrics = {
         "ari": float(np.mean(scores)),
         "ari_worst": min(scores),
@@ -99,7 +87,20 @@ def _accuracy(towns: list[Town]) -> Metrics:
         without = [adjusted_rand_index(made.districts, _settled(made, less)) for made in towns]
         metrics[key] = float(np.mean(without))
 
-    return metrics
+    setting.announce(f"a city of {CITY_OBJECTS} objects")
+    return metrics | _speed()
+
+
+def sub_maps_of(made: Town, config: Config, labels: Indices | None = None) -> SubMaps:
+    """Return the objects of a town, that are in no sub-map yet, or in those that `labels` name."""
+    return SubMaps(
+        made.positions_m,
+        made.functions,
+        Boundaries(made.boundaries_m),
+        config,
+        kinds=FUNCTIONS,
+        labels=labels,
+    )
 
 
 def _settled(made: Town, config: Config) -> Indices:
@@ -109,19 +110,8 @@ def _settled(made: Town, config: Config) -> Indices:
     return sub_maps.labels
 
 
-def _arriving(made: Town, config: Config) -> float:
-    """The adjusted Rand index after the objects came one at a time, in random order."""
-    order = np.random.default_rng(ORDER_SEED).permutation(len(made.positions_m))
-    sub_maps = sub_maps_of(made.select(order[:1]), config)
-    sub_maps.settle()
-    for index in order[1:].tolist():
-        sub_maps.add(made.positions_m[index], int(made.functions[index]))
-
-    return adjusted_rand_index(made.districts[order], sub_maps.labels)
-
-
 def _speed() -> Metrics:
-    """How long 10,000 objects take at once, the least of some times, and each of some more that
+    """The time of 10,000 objects at once, the least of some times, and of each of some more that
     arrive then.
     """
     city = town(CITY_SEED, CITY_DISTRICTS, CITY_PLOT_M)
@@ -150,3 +140,30 @@ def _speed() -> Metrics:
         "incremental_ms_p99": float(np.percentile(added_ms, 99)),
         "incremental_ms_max": max(added_ms),
     }
+
+
+def adjusted_rand_index(truth: Indices, labels: Indices) -> float:
+    """Return the adjusted Rand index of two partitions (n,): 1 if they are the same, about 0 if
+    they agree by chance alone.
+    """
+    metrics: Any = scikit_learn().metrics
+    return float(metrics.adjusted_rand_score(truth, labels))
+
+
+def gaussian_mixture(positions_m: Floats) -> Indices:
+    """(n,): the labels that a Gaussian mixture with a Dirichlet-process prior gives to positions,
+    (n, 2), by variational inference.
+    """
+    mixture: Any = scikit_learn().mixture
+    model = mixture.BayesianGaussianMixture(
+        n_components=min(MAX_COMPONENTS, len(positions_m)),
+        weight_concentration_prior_type="dirichlet_process",
+        max_iter=MAX_ITERATIONS,
+        random_state=0,
+    )
+    with warnings.catch_warnings():
+        # It warns if it has not converged after all iterations, and is taken as it is.
+        warnings.simplefilter("ignore")
+        labels = model.fit_predict(positions_m)
+
+    return np.asarray(labels, np.int64)

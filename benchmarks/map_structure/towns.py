@@ -61,7 +61,7 @@ class Town:
     districts: Indices
 
     def select(self, chosen: Indices) -> Town:
-        """The same town with some of its objects, (m,), in that order."""
+        """Return the same town with some of its objects, (m,), in that order."""
         return Town(
             positions_m=self.positions_m[chosen],
             functions=self.functions[chosen],
@@ -86,16 +86,26 @@ class _Plan(NamedTuple):
 
 
 def town(seed: int, districts: int | None = None, plot_m: float = PLOT_M) -> Town:
-    """A town of 3 to 12 districts, or of that many, on plots about `plot_m` wide."""
+    """Make a town of 3 to 12 districts, or of that many, on plots about `plot_m` wide."""
     rng = np.random.default_rng(seed)
     count = districts or int(rng.integers(*DISTRICTS))
-    plan = _plan(count, plot_m, rng)
-    boundaries_m = _boundaries(plan, rng)
 
+    # Plots, and districts that have grown over all of them.
+    plots = count * PLOTS_A_DISTRICT
+    side_m = plot_m * math.sqrt(plots)
+    sites_m = rng.uniform(0.0, side_m, (plots, 2))
+    borders = _borders(sites_m, side_m)
+    plan = _Plan(sites_m, borders, _grown(plots, borders, count, rng))
+
+    boundaries_m = _boundaries(plan, rng)
     positions_m, truth = _objects(plan, boundaries_m, rng)
     functions = _functions(truth, rng)
 
-    drifted_m = _drift(rng)
+    drifted_m = _Drift(
+        waves_per_m=rng.normal(0.0, 1 / DRIFT_LENGTH_M, (DRIFT_WAVES, 2)),
+        amplitudes_m=rng.normal(0.0, DRIFT_SD_M * math.sqrt(2 / DRIFT_WAVES), (DRIFT_WAVES, 2)),
+        phases_rad=rng.uniform(0.0, 2 * math.pi, DRIFT_WAVES),
+    )
     noise_m = rng.normal(0.0, POSITION_SD_M, positions_m.shape)
     return Town(
         positions_m=drifted_m(positions_m) + noise_m,
@@ -103,17 +113,6 @@ def town(seed: int, districts: int | None = None, plot_m: float = PLOT_M) -> Tow
         boundaries_m=drifted_m(boundaries_m.reshape(-1, 2)).reshape(-1, 2, 2),
         districts=truth,
     )
-
-
-def _plan(districts: int, plot_m: float, rng: np.random.Generator) -> _Plan:
-    """Plots, and districts that have grown over all of them."""
-    plots = districts * PLOTS_A_DISTRICT
-    side_m = plot_m * math.sqrt(plots)
-    sites_m = rng.uniform(0.0, side_m, (plots, 2))
-
-    borders = _borders(sites_m, side_m)
-    district_of = _grown(plots, borders, districts, rng)
-    return _Plan(sites_m, borders, district_of)
 
 
 def _borders(sites_m: Floats, side_m: float) -> list[_Border]:
@@ -228,7 +227,12 @@ def _objects(plan: _Plan, boundaries_m: Floats, rng: np.random.Generator) -> tup
         spacing_m = math.exp(rng.uniform(*np.log(SPACINGS_M)))
         scattered_m = _scattered(low_m, high_m, spacing_m, rng)
         is_inside = plan.district_of[plots.query(scattered_m)[1]] == district
-        inside_m = _set_back(scattered_m[is_inside], boundaries_m)
+        inside_m = scattered_m[is_inside]
+        if len(boundaries_m) and len(inside_m):
+            nearest = nearest_on_pieces(boundaries_m[:, 0], boundaries_m[:, 1], inside_m)
+            away_m = np.hypot(*(inside_m - nearest.foot_m).T)
+            inside_m = inside_m[away_m >= SETBACK_M]
+
         if len(inside_m) >= MIN_OBJECTS:
             positions_m.append(inside_m)
             districts.append(np.full(len(inside_m), district))
@@ -249,17 +253,6 @@ def _scattered(low_m: Floats, high_m: Floats, spacing_m: float, rng: np.random.G
 
     kept_m: Floats = points_m[is_kept]
     return kept_m
-
-
-def _set_back(points_m: Floats, boundaries_m: Floats) -> Floats:
-    """The points that are not too near a boundary."""
-    if not len(boundaries_m) or not len(points_m):
-        return points_m
-
-    nearest = nearest_on_pieces(boundaries_m[:, 0], boundaries_m[:, 1], points_m)
-    away_m = np.hypot(*(points_m - nearest.foot_m).T)
-    far_m: Floats = points_m[away_m >= SETBACK_M]
-    return far_m
 
 
 def _functions(districts: Indices, rng: np.random.Generator) -> Indices:
@@ -291,11 +284,3 @@ class _Drift:
         angles_rad = points_m @ self.waves_per_m.T + self.phases_rad
         drifted_m: Floats = points_m + np.sin(angles_rad) @ self.amplitudes_m
         return drifted_m
-
-
-def _drift(rng: np.random.Generator) -> _Drift:
-    return _Drift(
-        waves_per_m=rng.normal(0.0, 1 / DRIFT_LENGTH_M, (DRIFT_WAVES, 2)),
-        amplitudes_m=rng.normal(0.0, DRIFT_SD_M * math.sqrt(2 / DRIFT_WAVES), (DRIFT_WAVES, 2)),
-        phases_rad=rng.uniform(0.0, 2 * math.pi, DRIFT_WAVES),
-    )

@@ -1,11 +1,10 @@
-"""What the database loses: to kills of the process that writes it, and to damage of its file."""
+"""Records that the database loses to kills of its writer, and to damage of its file."""
 
 from __future__ import annotations
 
 import subprocess
 import sys
 import time
-from collections.abc import Iterable
 from contextlib import closing
 from pathlib import Path
 from random import Random
@@ -15,7 +14,7 @@ from benchmarks.memory.writer import record_of
 from cogmap.cli.progress import bar
 from cogmap.errors import StorageError
 from cogmap.runtime.state.database import Database, write_new
-from cogmap.runtime.state.record import Record, digest_of
+from cogmap.runtime.state.record import digest_of
 
 SEED = 11
 MAX_TRANSACTIONS = 20
@@ -27,8 +26,8 @@ _REPOSITORY = Path(__file__).parents[2]
 
 
 class Killed(NamedTuple):
-    """What kills have cost: how many records were acknowledged, and of these lost; and how many
-    kills have left a transaction that is rolled back.
+    """The records acknowledged before kills, and of these lost; and the kills that left a
+    transaction that is rolled back.
     """
 
     acknowledged: int
@@ -37,9 +36,7 @@ class Killed(NamedTuple):
 
 
 class Damaged(NamedTuple):
-    """What became of damaged copies: how many opened with other records, opened with the same, and
-    were refused.
-    """
+    """The damaged copies that opened with other records, opened with the same, and were refused."""
 
     changed: int
     same: int
@@ -50,7 +47,7 @@ def kill_writers(folder: Path, kills: int) -> Killed:
     """Kill a writer `kills` times, and look for what it acknowledged after each.
 
     Each kill comes after a random number of transactions and a random delay. Raises StorageError
-    where the database does not open.
+    if the database does not open.
     """
     path = folder / "killed.db"
     random = Random(SEED)
@@ -65,7 +62,15 @@ def kill_writers(folder: Path, kills: int) -> Killed:
                 acknowledged[record.key] = digest_of(record, sequence=0)
 
             rolled_back += has_hot_journal(path)
-            lost |= _missing(path, acknowledged)
+
+            # Missing, or not as acknowledged.
+            missing = set(acknowledged)
+            with closing(Database(path)) as database:
+                for record in database.records():
+                    if acknowledged.get(record.key) == digest_of(record, sequence=0):
+                        missing.remove(record.key)
+
+            lost |= missing
             progress((kill + 1) / kills)
 
     return Killed(len(acknowledged), len(lost), rolled_back)
@@ -75,26 +80,38 @@ def open_damaged(folder: Path, stores: int) -> Damaged:
     """Open `stores` copies of a database: of one half bytes are flipped, the other half is cut."""
     path = folder / "whole.db"
     write_new(path, map(record_of, range(STORED)))
-    stored = _thinned(path)
-    whole = path.read_bytes()
+    # With some records removed, the file has unused pages.
+    with closing(Database(path)) as database:
+        database.remove([record_of(number).key for number in REMOVED])
+        stored = list(database.records())
 
+    whole = path.read_bytes()
     random = Random(SEED)
-    outcomes = []
+    changed = 0
+    same = 0
+    refused = 0
     with bar("opening damaged databases") as progress:
         for store in range(stores):
             copy = folder / f"damaged-{store}.db"
             copy.write_bytes(_flipped(whole, random) if store % 2 else _cut(whole, random))
-            outcomes.append(_is_same(copy, stored))
+            try:
+                with closing(Database(copy)) as database:
+                    is_same = list(database.records()) == stored
+                same += is_same
+                changed += not is_same
+            except StorageError:
+                refused += 1
+
             copy.unlink()
             progress((store + 1) / stores)
 
-    return Damaged(outcomes.count(False), outcomes.count(True), outcomes.count(None))
+    return Damaged(changed, same, refused)
 
 
 def has_hot_journal(path: Path) -> bool:
     """Whether pages of an unfinished transaction may be in the database at `path`.
 
-    So it is where its journal's head does not begin with zero (sqlite.org/fileformat2, section 3).
+    They may be if its journal's head does not begin with zero (sqlite.org/fileformat2, section 3).
     """
     journal = path.with_name(f"{path.name}-journal")
     if not journal.exists():
@@ -116,36 +133,9 @@ def _written_until_killed(path: Path, first: int, random: Random) -> list[int]:
         writer.kill()
         lines += writer.stdout.readlines()
 
-    return _numbers(lines)
-
-
-def _numbers(lines: Iterable[str]) -> list[int]:
-    """The numbers in whole lines: the last may have been cut short by the kill."""
-    numbers = []
-    for line in lines:
-        if line.endswith("\n"):
-            numbers += [int(word) for word in line.split()]
-
-    return numbers
-
-
-def _missing(path: Path, acknowledged: dict[str, bytes]) -> set[str]:
-    """The keys of records that the database does not have as they were acknowledged."""
-    missing = set(acknowledged)
-    with closing(Database(path)) as database:
-        for record in database.records():
-            if acknowledged.get(record.key) == digest_of(record, sequence=0):
-                missing.remove(record.key)
-
-    return missing
-
-
-def _thinned(path: Path) -> list[Record]:
-    """Remove some records, so that the file has unused pages; the others."""
-    removed = [record_of(number).key for number in REMOVED]
-    with closing(Database(path)) as database:
-        database.remove(removed)
-        return list(database.records())
+    # The kill may have cut the last line short.
+    whole = [line for line in lines if line.endswith("\n")]
+    return [int(word) for line in whole for word in line.split()]
 
 
 def _flipped(whole: bytes, random: Random) -> bytes:
@@ -158,12 +148,3 @@ def _flipped(whole: bytes, random: Random) -> bytes:
 
 def _cut(whole: bytes, random: Random) -> bytes:
     return whole[: random.randrange(len(whole))]
-
-
-def _is_same(path: Path, stored: list[Record]) -> bool | None:
-    """Whether a database has the records that were stored; None where it is refused."""
-    try:
-        with closing(Database(path)) as database:
-            return list(database.records()) == stored
-    except StorageError:
-        return None

@@ -1,4 +1,4 @@
-"""How many episodes are recalled from a part of what was conscious, near to where that was.
+"""Recall of episodes from a part of their content, near the place at which they were.
 
 A town has buildings of few looks, so that most episodes share content with many others. A cue has
 two thirds of the content of one, something else in the place of the rest, and a position that is
@@ -28,8 +28,9 @@ PATH = 3
 
 
 def measure(seed: int) -> Metrics:
-    """Of cues to as many episodes as Declarative Memory may hold, the share that recalls its own,
-    and that which recalls another one, each above the match from which on one is offered.
+    """Return the share of cues that recall their own episode, and of those that recall another,
+    among as many episodes as Declarative Memory may hold; a match must be good enough to be
+    offered.
     """
     config = EpisodicConfig()
     rng = np.random.default_rng(seed)
@@ -41,7 +42,15 @@ def measure(seed: int) -> Metrics:
     right = 0
     wrong = 0
     for number in rng.choice(sorted(episodes), CUES, replace=False).tolist():
-        cue = _cue(episodes[number], rng)
+        episode = episodes[number]
+        beside_m = rng.normal(0.0, BESIDE_M, 2).tolist()
+        replaced = round(REPLACED * len(episode.content))
+        others = rng.choice(LOOKS, replaced, replace=False).tolist()
+        content = [*episode.content[replaced:], *(_object(look) for look in others)]
+        cue = msgspec.structs.replace(
+            episode, x_m=episode.x_m + beside_m[0], y_m=episode.y_m + beside_m[1], content=content
+        )
+
         found = cues.recalled(cue, lambda _: True)
         if found is not None and found.match >= MIN_MATCH:
             right += found.number == number
@@ -74,16 +83,6 @@ def _episodes(count: int, rng: np.random.Generator) -> dict[int, TransientEpisod
         path = [(x_m, y_m), *path][:PATH]
 
     return episodes
-
-
-def _cue(episode: TransientEpisode, rng: np.random.Generator) -> TransientEpisode:
-    beside_m = rng.normal(0.0, BESIDE_M, 2).tolist()
-    replaced = round(REPLACED * len(episode.content))
-    others = rng.choice(LOOKS, replaced, replace=False).tolist()
-    content = [*episode.content[replaced:], *(_object(look) for look in others)]
-    return msgspec.structs.replace(
-        episode, x_m=episode.x_m + beside_m[0], y_m=episode.y_m + beside_m[1], content=content
-    )
 
 
 def _object(look: int) -> Remembered:

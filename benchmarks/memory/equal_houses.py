@@ -1,8 +1,8 @@
-"""How far is driven between equal houses before a map is recalled, and whether another town's is.
+"""The distance driven between equal houses before a map is recalled, and recalls of another town's.
 
 A town is a grid of streets with houses of two looks, evenly spaced, one in ten of them missing. A
 first walk along its streets, in a frame of its own, gives the map; a second one recalls it, or has
-the maps of the other towns alone. Nothing is simulated but where each house is taken to stand.
+the maps of the other towns alone. Nothing is simulated but the noise of each house's position.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ RIGHT_WITHIN_RAD = 0.1
 
 
 class Walk(NamedTuple):
-    """Places 1 m apart, (k, 2), and the houses seen along it: their looks, where each stands,
-    (n, 2), and after which way it is seen, (n,); all in the walk's own frame, whose pose in the
-    town is `frame`.
+    """Places 1 m apart, (k, 2), and the houses seen along it: their looks, positions (n, 2) and the
+    distance driven before each is seen, (n,); all in the walk's own frame, whose pose in the town
+    is `frame`.
     """
 
     frame: Floats
@@ -55,7 +55,7 @@ class Walk(NamedTuple):
     after_m: Floats
 
     def objects(self, driven_m: int) -> list[Object]:
-        """What is known once so much was driven."""
+        """Return the houses known once so much was driven."""
         nodes = []
         for number in np.flatnonzero(self.after_m <= driven_m).tolist():
             label = individual_label(self.looks[number], 1 + number)
@@ -68,12 +68,19 @@ class Walk(NamedTuple):
 
 
 def measure(seed: int, towns: int = TOWNS) -> Metrics:
-    """The way driven before a town's own map is recalled and right, the whole way where it is not;
-    the share of the towns where it is; and how many maps are recalled wrongly, of the town's own or
-    of the others'.
+    """Return the distance driven before a town's own map is recalled and right, the whole walk if
+    it is not; the share of the towns in which it is; and how many maps are recalled wrongly, of the
+    town's own or of the others'.
     """
-    walks = [_walks(seed, number) for number in range(towns)]
-    maps = [_learned(f"town-{number}", first) for number, (first, _) in enumerate(walks)]
+    walks = []
+    maps = []
+    for number in range(towns):
+        rng = np.random.default_rng([seed, number, 0xE0])
+        lines_m = rng.uniform(*BLOCK_M, (2, CROSSINGS)).cumsum(axis=1)
+        looks, at_m = _houses(rng, lines_m)
+        first = _walk(rng, lines_m, LEARN_BLOCKS, looks, at_m)
+        walks.append((first, _walk(rng, lines_m, RECALL_BLOCKS, looks, at_m)))
+        maps.append(_learned(f"town-{number}", first))
 
     ways_m: list[int] = []
     are_right = []
@@ -96,8 +103,8 @@ def measure(seed: int, towns: int = TOWNS) -> Metrics:
 
 
 def recalled_after(walk: Walk, stored: Sequence[RememberedMap]) -> tuple[int, Floats | None]:
-    """After which way, in m, one of some maps is recalled, and the pose of the walk's frame in its
-    own; None where none is.
+    """Return the distance driven, in m, before one of some maps is recalled, and the pose of the
+    walk's frame in the map's; None if none is.
     """
     for driven_m in range(EVERY_M, len(walk.way_m), EVERY_M):
         known = walk.objects(driven_m)
@@ -114,15 +121,6 @@ def is_right(pose: Floats, first: Walk, second: Walk) -> bool:
     """Whether that is the pose of the second walk's frame in that of the first one."""
     x_m, y_m, turn_rad = relative(relative(first.frame, second.frame), pose).tolist()
     return math.hypot(x_m, y_m) <= RIGHT_WITHIN_M and abs(turn_rad) <= RIGHT_WITHIN_RAD
-
-
-def _walks(seed: int, number: int) -> tuple[Walk, Walk]:
-    """The first and the second walk in a town."""
-    rng = np.random.default_rng([seed, number, 0xE0])
-    lines_m = rng.uniform(*BLOCK_M, (2, CROSSINGS)).cumsum(axis=1)
-    looks, at_m = _houses(rng, lines_m)
-    first = _walk(rng, lines_m, LEARN_BLOCKS, looks, at_m)
-    return first, _walk(rng, lines_m, RECALL_BLOCKS, looks, at_m)
 
 
 def _houses(rng: np.random.Generator, lines_m: Floats) -> tuple[list[str], Floats]:

@@ -1,5 +1,5 @@
-"""A second run in a town that was learned: how soon its map is recalled, and whether another town's
-is taken for it.
+"""A second run in a town that was learned: the distance until its map is recalled, and recalls of
+another town's map.
 """
 
 from __future__ import annotations
@@ -57,9 +57,9 @@ class Visit:
 
 
 class Drive(NamedTuple):
-    """What a visit came to: the way driven, the map recalled (empty: none), how far it had been
-    driven by then, where the agent took itself to be at the end in the frame of its map, where it
-    was in the town, where it began there, and all that was stored.
+    """The result of a visit: the distance driven, the map recalled (empty: none), the distance
+    driven by then, the pose that the agent believed in the end in the frame of its map, its true
+    poses then and at the start in the town, and all that was stored.
     """
 
     driven_m: float
@@ -71,8 +71,8 @@ class Drive(NamedTuple):
     stored: list[StoredRecord]
 
     def error(self, frame: Floats) -> tuple[float, float]:
-        """How far, in m and rad, the agent is from where it takes itself to be, the origin of its
-        map being at the pose `frame` of the town.
+        """Return the error, in m and rad, of the believed pose, if the origin of the agent's map is
+        at the pose `frame` of the town.
         """
         x_m, y_m, turn_rad = relative(compose(frame, self.believed), self.true).tolist()
         return math.hypot(x_m, y_m), abs(turn_rad)
@@ -164,10 +164,10 @@ def sections(chosen: Visit) -> Sections:
 
 
 def measure(processes: int) -> Metrics:
-    """How far is driven before the map of the first run is recalled and right, over the first run's
-    way; and how often one of the other towns' maps is recalled instead.
+    """Return the distance driven before the map of the first run is recalled and right, over the
+    first run's; and how often one of the other towns' maps is recalled instead.
 
-    A town whose map is not recalled, or wrongly, counts with the whole way of the second run.
+    A town whose map is not recalled, or wrongly, counts with the whole second run.
     """
     seeds = list(range(FIRST_SEED, FIRST_SEED + TOWNS))
     learning = [Visit(seed, FIRST_START, (), LEARN_S) for seed in seeds]
@@ -202,8 +202,8 @@ def named(records: Sequence[StoredRecord], seed: int) -> list[StoredRecord]:
 
 
 def share_of_way(first: Drive, second: Drive) -> float:
-    """The way driven before a first run's map is recalled and right, over that of the first run;
-    the whole way of the second one where it is not.
+    """Return the distance driven before a first run's map is recalled and right, or else of the
+    whole second run, over that of the first run.
     """
     way_m = second.recalled_m if is_right(first, second) else second.driven_m
     return way_m / first.driven_m

@@ -1,4 +1,4 @@
-"""How fast a sparse distributed memory is read, against a plain loop over its hard locations."""
+"""The speed of reading sparse distributed memory, over that of a loop over its hard locations."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class NumpyLoop:
         self._radius = memory.radius
 
     def read_once(self, cue: Bytes) -> Bytes:
-        """What `ModularMemory.read_once` reads."""
+        """Read as `ModularMemory.read_once` does."""
         sums = np.zeros_like(self._mean)
         weights = 0
 

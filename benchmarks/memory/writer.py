@@ -7,7 +7,6 @@ transaction it prints the numbers of the records in it, in one line.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
 from pathlib import Path
 from random import Random
 
@@ -20,7 +19,7 @@ BATCH_SHARE = 0.1
 
 
 def record_of(number: int) -> Record:
-    """The record of a number, with 1 to MAX_BYTES bytes; sizes are log-uniform."""
+    """Return the record of a number, with 1 to MAX_BYTES bytes; sizes are log-uniform."""
     random = Random(number)
     size_bytes = int(MAX_BYTES ** random.random())
     return Record(f"record-{number}", "benchmark", random.randbytes(size_bytes))
@@ -31,18 +30,17 @@ def main() -> None:
 
     A batch is larger than SQLite's cache, so that its pages are in the file before its commit.
     """
-    database = Database(Path(sys.argv[1]))
-    for numbers in _transactions(int(sys.argv[2])):
+    path, first_number = sys.argv[1:]
+    database = Database(Path(path))
+    first = int(first_number)
+    random = Random(first)
+
+    while True:
+        count = BATCH if random.random() < BATCH_SHARE else 1
+        numbers = range(first, first + count)
         database.put(record_of(number) for number in numbers)
         sys.stdout.write(" ".join(map(str, numbers)) + "\n")
         sys.stdout.flush()
-
-
-def _transactions(first: int) -> Iterator[range]:
-    random = Random(first)
-    while True:
-        count = BATCH if random.random() < BATCH_SHARE else 1
-        yield range(first, first + count)
         first += count
 
 

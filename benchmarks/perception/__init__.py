@@ -1,1 +1,1 @@
-"""How well perception sees: held-out towns, drawn and then seen as the running system sees."""
+"""Perception by the modules of the running system, of held-out towns and of photographs."""

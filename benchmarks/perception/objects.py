@@ -55,62 +55,37 @@ class Sight:
 def sight(
     claims: Sequence[Claim], label: Bytes, kinds: Sequence[str], range_m: Sequence[float]
 ) -> Sight:
-    """What is claimed of a view against its true `label` (h, w): 0 or 1 + place in `kinds` and
+    """Compare the claims of a view with its true `label` (h, w): 0 or 1 + place in `kinds` and
     `range_m`.
     """
-    buildings = _buildings(label, kinds, range_m)
-    masks = [mask for _, _, mask in claims]
-    numbers = [building.number + 1 for building in buildings]
-    iou = overlaps(masks, label, numbers)
-    segments = []
+    numbers, pixels = np.unique(label[label > 0], return_counts=True)
+    buildings = []
+    for number, count in zip(numbers.tolist(), pixels.tolist(), strict=True):
+        place = number - 1
+        buildings.append(
+            Building(place, kinds[place], share=count / label.size, range_m=range_m[place])
+        )
 
-    for (name, activation, mask), place in zip(claims, match(iou), strict=True):
+    masks = [mask for _, _, mask in claims]
+    iou = overlaps(masks, label, numbers.tolist())
+    segments = []
+    for (name, activation, mask), matched in zip(claims, match(iou), strict=True):
+        counts = np.bincount(label[mask], minlength=MAX_LABELS)
+        shown = [each for each in buildings if counts[each.number + 1] >= mask.sum() / 2]
         segment = Segment(
             label=name,
             activation=activation,
             share=float(mask.mean()),
-            building=None if place is None else buildings[place],
-            shows=_shown(mask, label, buildings),
+            building=None if matched is None else buildings[matched],
+            shows=shown[0] if shown else None,
         )
         segments.append(segment)
 
-    return Sight(buildings, tuple(segments))
-
-
-def _buildings(
-    label: Bytes, kinds: Sequence[str], range_m: Sequence[float]
-) -> tuple[Building, ...]:
-    of_buildings = label[label > 0]
-    numbers, counts = np.unique(of_buildings, return_counts=True)
-    buildings = []
-
-    for number, count in zip(numbers.tolist(), counts.tolist(), strict=True):
-        place = number - 1
-        building = Building(
-            number=place,
-            kind=kinds[place],
-            share=count / label.size,
-            range_m=range_m[place],
-        )
-        buildings.append(building)
-
-    return tuple(buildings)
-
-
-def _shown(mask: Booleans, label: Bytes, buildings: Sequence[Building]) -> Building | None:
-    """The building that at least half of the mask's pixels are of."""
-    counts = np.bincount(label[mask], minlength=MAX_LABELS)
-    half = mask.sum() / 2
-
-    for building in buildings:
-        if counts[building.number + 1] >= half:
-            return building
-
-    return None
+    return Sight(tuple(buildings), tuple(segments))
 
 
 def claims(percepts: Sequence[Percept], shape: tuple[int, ...]) -> list[Claim]:
-    """What `percepts` of a view of that shape claim."""
+    """Return the claims of the `percepts` of a view of that shape."""
     found = []
     for percept in percepts:
         pixels = filled(percept, shape)
@@ -222,7 +197,16 @@ def right_or_not(
 
     for before, after in zip(candidates, percepts, strict=True):
         for segment in before.segments:
-            is_right = _is_right(segment, owner, trained)
+            building = segment.shows
+            if building is None:
+                is_right = not segment.label
+            elif segment.label in trained or building.kind in trained:
+                is_right = segment.label == building.kind
+            elif not segment.label:
+                is_right = building.number not in owner.values()
+            else:
+                is_right = owner.get(segment.label) == building.number
+
             judged.append((segment.activation, is_right))
 
         for segment in after.segments:
@@ -231,19 +215,6 @@ def right_or_not(
                 owner.setdefault(segment.label, shown)
 
     return judged
-
-
-def _is_right(segment: Segment, owner: dict[str, int | None], trained: frozenset[str]) -> bool:
-    building = segment.shows
-
-    if building is None:
-        return not segment.label
-    if segment.label in trained or building.kind in trained:
-        return segment.label == building.kind
-    if not segment.label:
-        return building.number not in owner.values()
-
-    return owner.get(segment.label) == building.number
 
 
 def calibration_error(judged: Sequence[tuple[float, bool]]) -> float:

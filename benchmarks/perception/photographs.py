@@ -37,7 +37,7 @@ PRIOR_LEVELS = np.linspace(0.05, 0.95, 19)
 def measure(camvid: Path, folder: Path) -> Metrics:
     """Train on CamVid's `train` photographs, and measure on its `val`; the weights go to `folder`.
 
-    Raises UsageError where torch is not installed, or the photographs cannot be read.
+    Raises UsageError if torch is not installed, or the photographs cannot be read.
     """
     weights = folder / "road-camvid.onnx"
     _train(photographs(camvid / "train", camvid / "trainannot"), weights)
@@ -59,7 +59,7 @@ def measure_by_drive(
 
     `camvid_iou_other_drive` is the mean over drives, `camvid_prior_other_drive` that of one mask
     for all images of the drive left out, the mean of those of the others. Both stand there by drive
-    too, and how long training took. Raises UsageError where torch is not installed, the photographs
+    too, and how long training took. Raises UsageError if torch is not installed, the photographs
     cannot be read, or are of a single drive.
     """
     image_folder, label_folder = training_folders(camvid)
@@ -85,14 +85,10 @@ def measure_by_drive(
         metrics[f"camvid_iou_{left_out}"] = road_iou(load(weights).mask, drives[left_out])
         metrics[f"camvid_prior_{left_out}"] = _mask_iou(mean_mask(known), drives[left_out])
 
-    return metrics | _means(metrics, drives)
-
-
-def _means(metrics: Metrics, drives: Iterable[str]) -> Metrics:
-    """The means over the drives, each of which counts alike."""
+    # Each drive counts alike.
     iou = float(np.mean([metrics[f"camvid_iou_{name}"] for name in drives]))
     prior = float(np.mean([metrics[f"camvid_prior_{name}"] for name in drives]))
-    return {
+    return metrics | {
         "camvid_iou_other_drive": iou,
         "camvid_prior_other_drive": prior,
         "camvid_over_prior": iou - prior,
@@ -105,7 +101,7 @@ def _train(
     epochs: int | None = None,
     images: int | None = None,
 ) -> None:
-    """Raises UsageError where torch is not installed."""
+    """Raises UsageError if torch is not installed."""
     try:
         from cogmap.training.camvid import train_on
     except ImportError as error:
@@ -115,8 +111,8 @@ def _train(
 
 
 def mean_mask(known: Sequence[Photograph]) -> Booleans:
-    """Return where most images show road, (120, 160): where the share of them that do is over the
-    threshold that gives the highest IoU on these images.
+    """Return the pixels (120, 160) that most images show as road: their share of the images is over
+    the threshold that gives the highest IoU on these images.
     """
     road = sum(_small(photograph.road) for photograph in known)
     labelled = sum(_small(photograph.known) for photograph in known)
@@ -127,18 +123,17 @@ def mean_mask(known: Sequence[Photograph]) -> Booleans:
 
 
 def _mask_iou(mask: Booleans, shown: Iterable[Photograph]) -> float:
-    """The IoU of road where each image is said to show it in `mask`."""
-    return road_iou(lambda image: _scaled(mask, image), shown)
+    """The IoU of road if each image shows it in `mask`."""
+
+    def scaled(image: Bytes) -> Booleans:
+        height, width, _ = image.shape
+        levels = cv2.resize(mask.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
+        return np.asarray(levels > 0)
+
+    return road_iou(scaled, shown)
 
 
 def _small(mask: Booleans) -> Singles:
     """The share of each of PRIOR_SIZE_PX pixels for which the mask is true."""
     shares = cv2.resize(mask.astype(np.float32), PRIOR_SIZE_PX, interpolation=cv2.INTER_AREA)
     return shares.astype(np.float32, copy=False)
-
-
-def _scaled(mask: Booleans, image: Bytes) -> Booleans:
-    """`mask` in the size of the image."""
-    height, width, _ = image.shape
-    levels = cv2.resize(mask.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
-    return np.asarray(levels > 0)

@@ -24,12 +24,11 @@ from cogmap.services.epam.recognition import objects, segments
 from cogmap.services.epam.view import view_arrays
 
 PERIOD_S = 0.2
-PERIOD_NS = round(PERIOD_S * 1e9)
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """What was made of one frame: view, percepts, objects learned, and the time taken."""
+    """The view and percepts of one frame, the objects learned, and the time taken."""
 
     view: View
     percepts: Percepts
@@ -37,29 +36,52 @@ class Result:
     took_ms: float
 
 
-class PerceptionPipeline:
-    """Both modules, new: what they learn, they learn from the frames that they `process`."""
+class SensoryPipeline:
+    """Sensory memory, new: a view of each stereo pair, PERIOD_S after the last."""
 
-    def __init__(self, calibration: Calibration) -> None:
+    def __init__(self, calibration: Calibration, period_s: float = PERIOD_S) -> None:
         self._calibration = calibration
+        self._period_s = period_s
         self._sensory = registry.build("sensory", {})
-        self._epam = registry.build("epam", {})
         self._frame = 0
 
-    def process(self, left: Bytes, right: Bytes, speed_m_s: float = 0.0) -> Result:
-        """What sensory memory and then EPAM make of the next frame, PERIOD_S after the last."""
-        frame = self._stereo(left, right)
+    def next_frame(self, left: Bytes, right: Bytes, speed_m_s: float = 0.0) -> StereoFrame:
+        """Return the frame of a pair; sensory memory gets the odometry up to it."""
+        number = self._frame
+        self._frame += 1
+        stamp_ns = self._frame * round(self._period_s * 1e9)
         odometry = Odometry(
-            stamp_ns=frame.stamp_ns,
-            speed_m_s=speed_m_s,
-            turn_rate_rad_s=0.0,
-            dt_s=PERIOD_S,
+            stamp_ns=stamp_ns, speed_m_s=speed_m_s, turn_rate_rad_s=0.0, dt_s=self._period_s
         )
         self._sensory.feed(odometry)
+        return StereoFrame(
+            stamp_ns=stamp_ns,
+            frame=number,
+            left=Array.of(left),
+            right=Array.of(right),
+            calibration=self._calibration,
+        )
+
+    def view(self, frame: StereoFrame) -> View:
+        """Return the view that sensory memory publishes of a frame."""
+        return next(each for each in self._sensory.feed(frame) if isinstance(each, View))
+
+
+class PerceptionPipeline:
+    """Sensory memory and EPAM, new: what they learn, they learn from the frames that they
+    `process`.
+    """
+
+    def __init__(self, calibration: Calibration) -> None:
+        self._sensory = SensoryPipeline(calibration)
+        self._epam = registry.build("epam", {})
+
+    def process(self, left: Bytes, right: Bytes, speed_m_s: float = 0.0) -> Result:
+        """Return the result of the next frame."""
+        frame = self._sensory.next_frame(left, right, speed_m_s)
 
         began_s = time.perf_counter()
-        sensed = self._sensory.feed(frame)
-        view = next(message for message in sensed if isinstance(message, View))
+        view = self._sensory.view(frame)
         recognised = self._epam.feed(view)
         took_ms = 1e3 * (time.perf_counter() - began_s)
 
@@ -70,17 +92,6 @@ class PerceptionPipeline:
 
         percepts = next(message for message in recognised if isinstance(message, Percepts))
         return Result(view, percepts, learned, took_ms)
-
-    def _stereo(self, left: Bytes, right: Bytes) -> StereoFrame:
-        number = self._frame
-        self._frame += 1
-        return StereoFrame(
-            stamp_ns=self._frame * PERIOD_NS,
-            frame=number,
-            left=Array.of(left),
-            right=Array.of(right),
-            calibration=self._calibration,
-        )
 
 
 class CandidateProbe:
@@ -98,24 +109,19 @@ class CandidateProbe:
         )
 
     def candidates(self, result: Result) -> list[tuple[str, float, Booleans]]:
-        """Label, empty for none that it knows, activation, and pixels (h, w) of each.
-
-        As they are before it learns from them.
+        """Return the likeliest label, empty for none that it knows, its probability, and pixels
+        (h, w) of each, as they are before it learns from them.
         """
         found = self._pam.candidates(view_arrays(result.view), result.view.calibration)
         self._pam.restore(result.learned)
         candidates = []
 
         for candidate in found:
-            label, activation = _likeliest(candidate.recognition)
+            label = ""
+            activation = candidate.recognition.unknown + candidate.recognition.background
+            if candidate.recognition.known:
+                label = candidate.recognition.label
+                activation = candidate.recognition.activation
             candidates.append((label, activation, candidate.segment.mask))
 
         return candidates
-
-
-def _likeliest(recognition: objects.Recognition) -> tuple[str, float]:
-    """The likeliest label, which may be that there is none, and the probability of that."""
-    if recognition.known:
-        return recognition.label, recognition.activation
-
-    return "", recognition.unknown + recognition.background

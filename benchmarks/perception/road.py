@@ -1,4 +1,4 @@
-"""How well road is found: its pixels, and where it ends on the ground."""
+"""The accuracy of road: of its pixels, and of its edges on the ground."""
 
 from __future__ import annotations
 
@@ -15,10 +15,9 @@ BEYOND_M = 3.0
 
 
 def road_iou(found: Booleans, surface: Bytes) -> float:
-    """Of all pixels that are road or taken for it, the share that are both; masks and surfaces are
-    (…, h, w).
+    """Return the intersection over union of road; masks and surfaces are (…, h, w).
 
-    `surface` is 2 where there is road. NaN where there is none at all.
+    `surface` is 2 where there is road. NaN if there is none at all.
     """
     road = surface == ROAD
     union = np.count_nonzero(found | road)
@@ -52,7 +51,7 @@ def road_edges_missed_m(
 
 
 def road_edge_error_m(errors_m: list[Floats]) -> float:
-    """The median over all points of all views. NaN where there is no point."""
+    """The median over all points of all views. NaN if there is no point."""
     every_m = np.concatenate([*errors_m, np.empty(0)])
     if not every_m.size:
         return float("nan")
@@ -63,12 +62,18 @@ def road_edge_error_m(errors_m: list[Floats]) -> float:
 def true_boundary_m(
     surface: Bytes, depth_m: Singles, camera: Calibration, within_m: float
 ) -> Floats:
-    """Where road and other ground are neighbours in the image: points half way between, (n, 2), in
-    the robot's frame.
+    """Return points (n, 2) half way between road and other ground that are neighbours in the image,
+    in the robot's frame.
 
     Where something upright hides the ground, or the image ends, nobody can see the road end.
     """
-    ground_m = _ground_m(depth_m, camera)
+    # Forward and left of the robot, (h, w, 2).
+    _, width_px = depth_m.shape
+    left_px = camera.cx_px - np.arange(width_px)
+    left_m = left_px / camera.fx_px * depth_m
+    forward_m = depth_m + camera.mount_forward_m
+    ground_m = np.stack([forward_m, left_m], axis=-1).astype(np.float64)
+
     beside_m = _between_m(surface[:, :-1], surface[:, 1:], ground_m[:, :-1], ground_m[:, 1:])
     below_m = _between_m(surface[:-1], surface[1:], ground_m[:-1], ground_m[1:])
 
@@ -79,30 +84,16 @@ def true_boundary_m(
 
 
 def _between_m(one: Bytes, other: Bytes, one_m: Floats, other_m: Floats) -> Floats:
-    """Points (n, 2) half way between neighbouring pixels where road ends.
+    """Points (n, 2) half way between neighbouring pixels of which one is road and the other is
+    other ground.
 
-    `one` and `other` are their surfaces (h, w), `one_m` and `other_m` what ground they show.
+    `one` and `other` are their surfaces (h, w), `one_m` and `other_m` the ground that they show.
     """
-    is_boundary = _is_boundary(one, other)
-    return (one_m[is_boundary] + other_m[is_boundary]) / 2
-
-
-def _is_boundary(one: Bytes, other: Bytes) -> Booleans:
-    """Where one of two surfaces is road and the other is other ground."""
     is_left = (one == ROAD) & (other == GROUND)
     is_entered = (one == GROUND) & (other == ROAD)
-    return np.asarray(is_left | is_entered)
-
-
-def _ground_m(depth_m: Singles, camera: Calibration) -> Floats:
-    """Forward and left of the robot, (h, w, 2), what each pixel shows."""
-    _, width_px = depth_m.shape
-    left_px = camera.cx_px - np.arange(width_px)
-    left_m = left_px / camera.fx_px * depth_m
-    forward_m = depth_m + camera.mount_forward_m
-
-    ground_m = np.stack([forward_m, left_m], axis=-1)
-    return ground_m.astype(np.float64)
+    is_boundary = is_left | is_entered
+    middles_m: Floats = (one_m[is_boundary] + other_m[is_boundary]) / 2
+    return middles_m
 
 
 def _points_m(boundary_m: npt.ArrayLike) -> Floats:

@@ -73,22 +73,21 @@ def drawn(
         camera = StereoCamera(world, calibration())
         rng = np.random.default_rng([seed, 0xBE])
         places = poses(place, rng)
-        scenes = (_scene(world, camera, pose, rng) for pose in places)
-        yield place, camera.calibration, scenes
+
+        def scene(pose: Pose) -> Scene:
+            view = towns.labelled(world, camera, pose, rng)
+            return Scene(
+                left=np.asarray(view["left"], np.uint8),
+                right=np.asarray(view["right"], np.uint8),
+                depth_m=np.asarray(view["depth_m"], np.float32),
+                label=np.asarray(view["label"], np.uint8),
+                surface=np.asarray(view["surface"], np.uint8),
+                pose=pose,
+            )
+
+        yield place, camera.calibration, map(scene, places)
     finally:
         world.close()
-
-
-def _scene(world: World, camera: StereoCamera, pose: Pose, rng: np.random.Generator) -> Scene:
-    view = towns.labelled(world, camera, pose, rng)
-    return Scene(
-        left=np.asarray(view["left"], np.uint8),
-        right=np.asarray(view["right"], np.uint8),
-        depth_m=np.asarray(view["depth_m"], np.float32),
-        label=np.asarray(view["label"], np.uint8),
-        surface=np.asarray(view["surface"], np.uint8),
-        pose=pose,
-    )
 
 
 def anywhere(count: int) -> Poses:
@@ -101,7 +100,12 @@ def anywhere(count: int) -> Poses:
         for number in range(count):
             turn, is_on_street = divmod(number, 2)
             if is_on_street:
-                made.append(_on_a_street(place, rng))
+                road = place.roads[int(rng.integers(len(place.roads)))]
+                along_m = float(rng.uniform(0, road.length_m))
+                aside_m = float(rng.uniform(-LANE_M, LANE_M))
+                x_m, y_m = road.point(along_m, aside_m)
+                heading_rad = float(rng.uniform(-math.pi, math.pi))
+                made.append(Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad))
             else:
                 target = turn % len(place.plots)
                 made.append(_towards(place, target, rng))
@@ -115,38 +119,20 @@ def drive(metres: float, step_m: float) -> Poses:
     """A path along the town's loop from its start, corners turned on the spot."""
 
     def poses(place: town.Town, rng: np.random.Generator) -> list[Pose]:
-        corners_m = np.asarray(place.line(1.0)).tolist()
-        count = round(metres / step_m)
+        corners_m = np.asarray(place.line(1.0))
         made: list[Pose] = []
 
         for start_m, end_m in itertools.pairwise(corners_m):
-            made += _straight(start_m, end_m, step_m)
+            ahead_m = end_m - start_m
+            length_m = math.hypot(*ahead_m)
+            heading_rad = math.atan2(ahead_m[1], ahead_m[0])
+            for share in np.arange(0.0, length_m, step_m) / length_m:
+                x_m, y_m = (start_m + share * ahead_m).tolist()
+                made.append(Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad))
 
-        return made[:count]
+        return made[: round(metres / step_m)]
 
     return poses
-
-
-def _straight(start_m: Sequence[float], end_m: Sequence[float], step_m: float) -> list[Pose]:
-    """Poses every `step_m` from one point towards another."""
-    x_m, y_m = start_m
-    end_x_m, end_y_m = end_m
-    ahead_x_m = end_x_m - x_m
-    ahead_y_m = end_y_m - y_m
-    heading_rad = math.atan2(ahead_y_m, ahead_x_m)
-    length_m = math.hypot(ahead_x_m, ahead_y_m)
-    shares = np.arange(0.0, length_m, step_m) / length_m
-    made = []
-
-    for share in shares.tolist():
-        pose = Pose(
-            x_m=x_m + share * ahead_x_m,
-            y_m=y_m + share * ahead_y_m,
-            heading_rad=heading_rad,
-        )
-        made.append(pose)
-
-    return made
 
 
 def _turned(pose: Pose, turn_rad: float) -> Pose:
@@ -164,17 +150,6 @@ def _towards(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
         if towns.is_free(place, pose.x_m, pose.y_m):
             turn_rad = float(rng.normal(0, LOOKING_SD_RAD))
             return _turned(pose, turn_rad)
-
-
-def _on_a_street(place: town.Town, rng: np.random.Generator) -> Pose:
-    number = int(rng.integers(len(place.roads)))
-    road = place.roads[number]
-    along_m = float(rng.uniform(0, road.length_m))
-    aside_m = float(rng.uniform(-LANE_M, LANE_M))
-
-    x_m, y_m = road.point(along_m, aside_m)
-    heading_rad = float(rng.uniform(-math.pi, math.pi))
-    return Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad)
 
 
 def facing(place: town.Town, target: int, range_m: float, side_rad: float) -> Pose:
@@ -206,16 +181,7 @@ def skyline(place: town.Town, pose: Pose) -> npt.NDArray[np.intp]:
     there is none.
     """
     bearings_rad = np.linspace(HALF_VIEW_RAD, -HALF_VIEW_RAD, RAYS)
-    range_m = _ray_ranges_m(place, pose, pose.heading_rad + bearings_rad)
-    nearest = range_m.argmin(axis=1)
-    is_hit = np.isfinite(range_m.min(axis=1))
-    return np.where(is_hit, nearest, -1)
-
-
-def _ray_ranges_m(place: town.Town, pose: Pose, direction_rad: Floats) -> Floats:
-    """How far the robot is from each plot in each direction, (rays, plots); infinite where the ray
-    misses it.
-    """
+    direction_rad = pose.heading_rad + bearings_rad
     rays = np.stack([np.cos(direction_rad), np.sin(direction_rad)], axis=1)
     footprints_m = np.array([plot.footprint for plot in place.plots])
     corners_m = footprints_m.reshape(-1, 2, 2) - (pose.x_m, pose.y_m)
@@ -227,7 +193,8 @@ def _ray_ranges_m(place: town.Town, pose: Pose, direction_rad: Floats) -> Floats
     enter_m = crossings_m.min(axis=2).max(axis=2)
     leave_m = crossings_m.max(axis=2).min(axis=2)
     is_hit = (enter_m <= leave_m) & (enter_m > 0)
-    return np.where(is_hit, enter_m, np.inf)
+    range_m = np.where(is_hit, enter_m, np.inf)
+    return np.where(is_hit.any(axis=1), range_m.argmin(axis=1), -1)
 
 
 def encounter(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
@@ -241,27 +208,18 @@ def encounter(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
         range_m = float(rng.uniform(*ENCOUNTER_M))
         side_rad = float(rng.uniform(-math.pi, math.pi))
         pose = facing(place, target, range_m, side_rad)
+        # How much more of others is seen than of the target; RAYS more unless it is seen whole.
         seen = skyline(place, pose)
-        cost = _encounter_cost(seen, target)
+        own = np.count_nonzero(seen == target)
+        others = np.count_nonzero(seen >= 0) - own
+        is_whole = own >= MIN_WHOLE_RAYS and target not in (seen[0], seen[-1])
+        cost = int(others - own) + (0 if is_whole else RAYS)
 
         if cost < min_cost and towns.is_free(place, pose.x_m, pose.y_m):
             best = pose
             min_cost = cost
 
     return best or _towards(place, target, rng)
-
-
-def _encounter_cost(seen: npt.NDArray[np.intp], target: int) -> int:
-    """How much more of others is seen than of the target; RAYS more where it is not seen whole."""
-    own = np.count_nonzero(seen == target)
-    others = np.count_nonzero(seen >= 0) - own
-    cost = int(others - own)
-
-    is_cut_off = target in (seen[0], seen[-1])
-    if is_cut_off or own < MIN_WHOLE_RAYS:
-        return cost + RAYS
-
-    return cost
 
 
 def later(place: town.Town, target: int, first: Pose, rng: np.random.Generator) -> Pose | None:
@@ -278,17 +236,14 @@ def later(place: town.Town, target: int, first: Pose, rng: np.random.Generator) 
         pose = _turned(towards, turn_rad)
 
         _, range_m = side_and_range(place, pose)[target].tolist()
-        if other_distance(range_m, first_m) and _is_clear(place, target, pose):
+        if not other_distance(range_m, first_m) or not towns.is_free(place, pose.x_m, pose.y_m):
+            continue
+
+        rays = np.count_nonzero(skyline(place, pose) == target)
+        if rays >= MARGIN_RAYS:
             return pose
 
     return None
-
-
-def _is_clear(place: town.Town, target: int, pose: Pose) -> bool:
-    """Whether the robot can be there, and sees enough of plot `target`."""
-    seen = skyline(place, pose)
-    rays = int(np.count_nonzero(seen == target))
-    return rays >= MARGIN_RAYS and towns.is_free(place, pose.x_m, pose.y_m)
 
 
 def other_distance(range_m: float, first_m: float) -> bool:

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.report import Metrics
-from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
+from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.polylines import distances_along
 from cogmap.robot import NEAREST_DEPTH_M, calibration
 from cogmap.schemas.sensing import PlaceMatch, Pose
@@ -59,9 +59,7 @@ class Stretch:
 
 @dataclass(frozen=True)
 class Answer:
-    """Where a view was taken, in which town and on which part of the drive, and the place that it
-    was matched with.
-    """
+    """The town, part of the drive and pose of a view, and the place that it was matched with."""
 
     seed: int
     part: int
@@ -75,7 +73,7 @@ def measure() -> Metrics:
     answers = list[Answer]()
 
     for seed, invented in TOWNS:
-        place = _town(seed, invented)
+        place = town.generate(seed, towns.kinds(seed, invented))
         answers += drive(recognizer, len(answers), place)
 
     return metrics(answers)
@@ -83,18 +81,8 @@ def measure() -> Metrics:
 
 def drive(recognizer: PlaceRecognizer, first_frame: int, place: town.Town) -> Iterator[Answer]:
     """Drive through a town and ask `recognizer` at each view; frames count from `first_frame`."""
-    frame = first_frame
-
-    for stretch, pose, left, depth_m in _views(place):
-        matches, _ = recognizer.observe(frame, frame * FRAME_NS, left, depth_m)
-        best = matches[0] if matches else None
-        yield Answer(place.seed, stretch.part, pose, best)
-        frame += 1
-
-
-def _views(place: town.Town) -> Iterator[tuple[Stretch, Pose, Bytes, Singles]]:
-    """From every pose of the course the left image (h, w, 3), rectified, and its depth (h, w)."""
     world = World(place)
+    frame = first_frame
 
     try:
         camera = StereoCamera(world, calibration())
@@ -107,7 +95,10 @@ def _views(place: town.Town) -> Iterator[tuple[Stretch, Pose, Bytes, Singles]]:
                 world.robot.place(pose)
                 left_eye, right_eye = camera.capture_labelled(stretch.light, rng)
                 left, right = straight.apply(left_eye.image, right_eye.image)
-                yield stretch, pose, left, stereo.depth_m(left, right)
+                depth_m = stereo.depth_m(left, right)
+                matches, _ = recognizer.observe(frame, frame * FRAME_NS, left, depth_m)
+                yield Answer(place.seed, stretch.part, pose, matches[0] if matches else None)
+                frame += 1
     finally:
         world.close()
 
@@ -142,11 +133,26 @@ def poses(
     Each is beside the line by up to `offset_m`, and turned from its direction by up to `turn_rad`:
     these and the length of a step change slowly along the line.
     """
-    at_m, points_m = _rounded(line)
+    # Points close to each other; the mean over CORNER_M around each cuts corners smoothly.
+    corners_m = np.asarray(line, np.float64)
+    along_m = distances_along(corners_m)
+    even_m = np.linspace(0, along_m[-1], math.ceil(along_m[-1] / SPACING_M))
+    half = round(CORNER_M / SPACING_M / 2)
+    window = np.full(2 * half + 1, 1 / (2 * half + 1))
+    smooth = []
+    for values in corners_m.T:
+        padded = np.pad(np.interp(even_m, along_m, values), half, mode="edge")
+        smooth.append(np.convolve(padded, window, mode="valid"))
+
+    points_m = np.stack(smooth, axis=1)
+    at_m = distances_along(points_m)
+    x_ahead, y_ahead = np.gradient(points_m, axis=0).T
+    headings_rad = np.unwrap(np.arctan2(y_ahead, x_ahead))
+
     step = _slowly(rng, at_m, SPEED_CHANGES_M, 1.0)
     offset = _slowly(rng, at_m, OFFSET_CHANGES_M, offset_m)
     turn = _slowly(rng, at_m, TURN_CHANGES_M, turn_rad)
-    columns = np.column_stack([points_m, _headings_rad(points_m), offset, turn, step])
+    columns = np.column_stack([points_m, headings_rad, offset, turn, step])
 
     min_step_m, max_step_m = steps_m
     mean_step_m = (min_step_m + max_step_m) / 2
@@ -156,58 +162,16 @@ def poses(
 
     while here_m <= at_m[-1]:
         here = [float(np.interp(here_m, at_m, column)) for column in columns.T]
-        *beside, speed = here
-        found.append(_pose_beside(*beside))
+        x_m, y_m, along_rad, left_m, turned_rad, speed = here
+        beside = Pose(
+            x_m=x_m - left_m * math.sin(along_rad),
+            y_m=y_m + left_m * math.cos(along_rad),
+            heading_rad=along_rad + turned_rad,
+        )
+        found.append(beside)
         here_m += mean_step_m + half_range_m * speed
 
     return found
-
-
-def _pose_beside(
-    x_m: float, y_m: float, along_rad: float, left_m: float, turned_rad: float
-) -> Pose:
-    """The pose `left_m` of a point of the line, `turned_rad` from its direction `along_rad`."""
-    return Pose(
-        x_m=x_m - left_m * math.sin(along_rad),
-        y_m=y_m + left_m * math.cos(along_rad),
-        heading_rad=along_rad + turned_rad,
-    )
-
-
-def _headings_rad(points_m: Floats) -> Floats:
-    """The direction (n,) of the line through (n, 2) points at each of them, without jumps."""
-    x_ahead, y_ahead = np.gradient(points_m, axis=0).T
-    headings_rad: Floats = np.arctan2(y_ahead, x_ahead)
-    return np.unwrap(headings_rad)
-
-
-def _rounded(line: Sequence[Point]) -> tuple[Floats, Floats]:
-    """How far along `line` each of (n,) points close to each other is, and the points (n, 2).
-
-    Corners are cut smoothly.
-    """
-    corners_m = np.asarray(line, np.float64)
-    along_m = distances_along(corners_m)
-    length_m = along_m[-1]
-    count = math.ceil(length_m / SPACING_M)
-    even_m = np.linspace(0, length_m, count)
-
-    columns = []
-    for values in corners_m.T:
-        column = np.interp(even_m, along_m, values)
-        columns.append(_smoothed(column))
-
-    points_m = np.stack(columns, axis=1)
-    return distances_along(points_m), points_m
-
-
-def _smoothed(column: Floats) -> Floats:
-    """The mean of (n,) values over CORNER_M around each."""
-    half = round(CORNER_M / SPACING_M / 2)
-    width = 2 * half + 1
-    window = np.full(width, 1 / width)
-    padded = np.pad(column, half, mode="edge")
-    return np.convolve(padded, window, mode="valid")
 
 
 def _slowly(rng: np.random.Generator, at_m: Floats, every_m: float, limit: float) -> Floats:
@@ -220,11 +184,16 @@ def _slowly(rng: np.random.Generator, at_m: Floats, every_m: float, limit: float
 
 def metrics(answers: Sequence[Answer]) -> Metrics:
     """Recall at 99 % precision, and that of the answers as they were given."""
-    score = np.array([_score(answer) for answer in answers])
-    right = np.array([_is_right(answer, answers) for answer in answers])
+    score = np.array([answer.match.score if answer.match else 0.0 for answer in answers])
+    right = np.array(
+        [
+            answer.match is not None and same(answer, answers[answer.match.frame])
+            for answer in answers
+        ]
+    )
     again = np.array([answer.part == SECOND_LAP for answer in answers])
     first = [answer for answer in answers if answer.part == FIRST_LAP]
-    was_seen = np.array([_was_seen(answer, first) for answer in answers])
+    was_seen = np.array([any(same(answer, other) for other in first) for answer in answers])
 
     wanted = again & was_seen
     matched = score > 0
@@ -239,25 +208,6 @@ def metrics(answers: Sequence[Answer]) -> Metrics:
     }
 
 
-def _score(answer: Answer) -> float:
-    """The score of its match, 0 where it has none."""
-    return 0.0 if answer.match is None else answer.match.score
-
-
-def _is_right(answer: Answer, answers: Sequence[Answer]) -> bool:
-    """Whether it matches a view of the same place."""
-    if answer.match is None:
-        return False
-
-    matched = answers[answer.match.frame]
-    return same(answer, matched)
-
-
-def _was_seen(answer: Answer, before: Sequence[Answer]) -> bool:
-    """Whether one of those before it was at the same place."""
-    return any(same(answer, other) for other in before)
-
-
 def _ratio(some: Booleans, of_all: Booleans) -> float:
     count = max(1, of_all.sum())
     return float(some.sum() / count)
@@ -267,7 +217,7 @@ def recall(score: Floats, right: Booleans, wanted: Booleans, precision: float) -
     """The share of `wanted` views that are matched rightly, at the lowest score that gives at least
     `precision`.
 
-    0 where no score does; a view of score 0 is not matched.
+    0 if no score does; a view of score 0 is not matched.
     """
     scores = score[score > 0]
     for min_score in np.unique(scores):
@@ -287,8 +237,3 @@ def same(one: Answer, other: Answer) -> bool:
     y_m = one.pose.y_m - other.pose.y_m
     turn_rad = math.remainder(one.pose.heading_rad - other.pose.heading_rad, math.tau)
     return math.hypot(x_m, y_m) < SAME_M and abs(turn_rad) < SAME_RAD
-
-
-def _town(seed: int, invented: int) -> town.Town:
-    kinds = towns.kinds(seed, invented)
-    return town.generate(seed, kinds)

@@ -27,7 +27,7 @@ def measure(left: Path, right: Path, disparity: Path, scale: float) -> Metrics:
     """The shares of pixels whose disparity errs by more than OFF_PX, ours and plain StereoSGBM's.
 
     Of all pixels whose truth is known; a pixel without a match counts as wrong, for both.
-    `*_together_*` is of the pixels only that both match. Raises UsageError where a file is missing,
+    `*_together_*` is of the pixels only that both match. Raises UsageError if a file is missing,
     no image, or of another size.
     """
     left_rgb = _read_rgb(left)
@@ -63,7 +63,7 @@ def compared(left: Bytes, right: Bytes, true_px: Singles) -> Metrics:
 
 
 def _check_size(path: Path, image: Image, left: Path, left_image: Image) -> None:
-    """Raise UsageError where an image is of another size than the left one."""
+    """Raise UsageError if an image is of another size than the left one."""
     size = _size(image)
     left_size = _size(left_image)
     if size != left_size:
@@ -81,7 +81,7 @@ def _off(name: str, found_px: Singles, true_px: Singles) -> Metrics:
 
 def off_share(found_px: Singles, true_px: Singles, most_px: float) -> float:
     """Of the pixels with a true disparity, over 0, the share that errs by more than `most_px`, or
-    is not found, 0. NaN where no pixel has one.
+    is not found, 0. NaN if no pixel has one.
     """
     is_known = true_px > 0
     if not is_known.any():

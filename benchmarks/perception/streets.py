@@ -1,4 +1,4 @@
-"""Where the streets of a town end, from its plan."""
+"""The edges of a town's streets, from its plan."""
 
 from __future__ import annotations
 
@@ -29,9 +29,11 @@ def edges(areas: Sequence[Rectangle]) -> Floats:
     outer = []
 
     for area in areas:
-        for piece in _sides(area, xs, ys):
-            if not _is_inside(_middle(piece), areas):
-                outer.append(piece)
+        for (start_x, start_y), (end_x, end_y) in _sides(area, xs, ys):
+            x = (start_x + end_x) / 2
+            y = (start_y + end_y) / 2
+            if not any(west < x < east and south < y < north for west, south, east, north in areas):
+                outer.append(((start_x, start_y), (end_x, end_y)))
 
     pieces = np.asarray(outer, np.float64)
     return pieces.reshape(-1, 2, 2)
@@ -50,18 +52,6 @@ def _sides(area: Rectangle, xs: Sequence[float], ys: Sequence[float]) -> Iterato
         if south <= y and beyond_y <= north:
             yield (west, y), (west, beyond_y)
             yield (east, y), (east, beyond_y)
-
-
-def _middle(piece: Piece) -> Point:
-    (start_x, start_y), (end_x, end_y) = piece
-    middle_x = (start_x + end_x) / 2
-    middle_y = (start_y + end_y) / 2
-    return middle_x, middle_y
-
-
-def _is_inside(point: Point, areas: Sequence[Rectangle]) -> bool:
-    x, y = point
-    return any(west < x < east and south < y < north for west, south, east, north in areas)
 
 
 def distances_m(points_m: npt.ArrayLike, pieces: Floats) -> Floats:

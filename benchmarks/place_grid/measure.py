@@ -55,9 +55,12 @@ def measure(setting: Setting) -> Metrics:
     for number in range(CHANGES):
         proposal = _proposal(number, ledger.graph.version, rng)
         began_s = time.perf_counter()
-        payload = _committed(ledger, proposal)
+        (valid,) = ledger.validate([proposal])
+        payload = encode(ledger.commit(0, 1, Phase.OBJECTS, valid.operations, [valid.task_id]))
         committed_s = time.perf_counter()
-        _follow(replica, payload)
+        delta = decode(topics.DELTA, payload)
+        assert isinstance(delta, Delta)
+        replica.apply(delta)
         applied_s = time.perf_counter()
 
         commit_ms.append(1e3 * (committed_s - began_s))
@@ -97,20 +100,6 @@ def _proposal(number: int, base_version: int, rng: np.random.Generator) -> Propo
         base_version=base_version,
         operations=operations,
     )
-
-
-def _committed(ledger: Ledger, proposal: Proposal) -> bytes:
-    """Validate a proposal, commit it and encode the delta, as the workspace does."""
-    (valid,) = ledger.validate([proposal])
-    delta = ledger.commit(0, 1, Phase.OBJECTS, valid.operations, [valid.task_id])
-    return encode(delta)
-
-
-def _follow(replica: Graph, payload: bytes) -> None:
-    """Decode and apply a delta, as each replica does."""
-    delta = decode(topics.DELTA, payload)
-    assert isinstance(delta, Delta)
-    replica.apply(delta)
 
 
 def _bytes_per_node(snapshot: Snapshot) -> float:

@@ -1,1 +1,1 @@
-"""How well the spikes of place cells are samples of the exact posterior (paper, figure 4)."""
+"""The spikes of place cells as samples of the exact posterior (paper, figure 4)."""

@@ -44,7 +44,10 @@ def figure(scenes: list[Scene], seeds: Sequence[int]) -> Figure:
         panels = sheet.subplot_mosaic(MOSAIC, height_ratios=[1.25, 1])
         _draw_prior(panels["grid"], scene.cues, spikes)
         _draw_likelihood(panels["border"], scene.cues, spikes)
-        _draw_posterior(panels["place"], scene, spikes)
+        _show(panels["place"], spikes.counts, "c   place cells: coincidences")
+        _draw_ellipse(panels["place"], scene.exact, TRUE, "-", "exact posterior, 2 SD")
+        _draw_ellipse(panels["place"], scene.spiking, ESTIMATE, DASHES, "the spikes', 2 SD")
+        _add_legend(panels["place"])
         draw_raster(panels["raster"], spikes)
         _draw_agreement(panels["agreement"], scenes)
         sheet.suptitle(
@@ -62,7 +65,7 @@ def figure(scenes: list[Scene], seeds: Sequence[int]) -> Figure:
 
 
 def _draw_prior(axes: Axes, cues: Cues, spikes: Recording) -> None:
-    """How often the grid cells of each place cell fired together."""
+    """Show the counts of the cycles in which all grid cells of each place cell fired."""
     together = np.full_like(spikes.place, ALL_BITS)
     for spacing_m, fired in zip(SPACINGS_M, spikes.grid, strict=True):
         nearest = GridModule(spacing_m).nearest(spikes.centres_m)
@@ -75,7 +78,7 @@ def _draw_prior(axes: Axes, cues: Cues, spikes: Recording) -> None:
 
 
 def _draw_likelihood(axes: Axes, cues: Cues, spikes: Recording) -> None:
-    """How often the border cells of each place cell fired together."""
+    """Show the counts of the cycles in which all border cells of each place cell fired."""
     cells = BorderCells(SIDE_M)
     together = np.full_like(spikes.place, ALL_BITS)
     for axis, fired in enumerate(spikes.border):
@@ -88,14 +91,6 @@ def _draw_likelihood(axes: Axes, cues: Cues, spikes: Recording) -> None:
     title = "b   border cells: distances to two walls, the likelihood"
     _show(axes, _counts(together), title)
     _draw_ellipse(axes, walls, TRUE, "-", "likelihood, 2 SD")
-    _add_legend(axes)
-
-
-def _draw_posterior(axes: Axes, scene: Scene, spikes: Recording) -> None:
-    """How often each place cell fired."""
-    _show(axes, spikes.counts, "c   place cells: coincidences")
-    _draw_ellipse(axes, scene.exact, TRUE, "-", "exact posterior, 2 SD")
-    _draw_ellipse(axes, scene.spiking, ESTIMATE, DASHES, "the spikes', 2 SD")
     _add_legend(axes)
 
 

@@ -28,7 +28,6 @@ MAX_CORRELATION = 0.6
 BORDER_SD_M = (0.15, 0.4)
 SENSED_AXES = ((0,), (1,), (0, 1))
 SAMPLES = 20_000
-Covariance = tuple[tuple[float, float], tuple[float, float]]
 THRESHOLDS = {
     "posterior_sd_ratio": within(0.9, 1.1),
     "posterior_mean_error": at_most(0.1),
@@ -67,12 +66,16 @@ class Scene:
 
 
 def cues(seed: int) -> Cues:
-    """A walk's end somewhere in the middle of a room, and one or two walls whose distance is
+    """Draw a walk's end somewhere in the middle of a room, and one or two walls whose distance is
     sensed.
     """
     rng = np.random.default_rng([seed, 0])
     x_m, y_m = rng.uniform(*MIDDLE_M, 2).tolist()
-    covariance_m2 = _covariance(rng)
+
+    # That of path integration: correlated standard deviations.
+    x_sd_m, y_sd_m = rng.uniform(*PRIOR_SD_M, 2).tolist()
+    across_m2 = float(rng.uniform(-MAX_CORRELATION, MAX_CORRELATION)) * x_sd_m * y_sd_m
+    covariance_m2 = ((x_sd_m**2, across_m2), (across_m2, y_sd_m**2))
     true_m = rng.multivariate_normal((x_m, y_m), covariance_m2)
 
     axes = SENSED_AXES[seed % len(SENSED_AXES)]
@@ -85,49 +88,32 @@ def cues(seed: int) -> Cues:
     return Cues((x_m, y_m), covariance_m2, tuple(borders))
 
 
-def _covariance(rng: np.random.Generator) -> Covariance:
-    """That of path integration: standard deviations in PRIOR_SD_M, correlated."""
-    x_sd_m, y_sd_m = rng.uniform(*PRIOR_SD_M, 2)
-    correlation = rng.uniform(-MAX_CORRELATION, MAX_CORRELATION)
-
-    across_m2 = float(correlation * x_sd_m * y_sd_m)
-    along_x = (float(x_sd_m**2), across_m2)
-    along_y = (across_m2, float(y_sd_m**2))
-    return along_x, along_y
-
-
 def recording(seed: int) -> Recording:
-    """The spikes of the scene of that seed."""
+    """Record the spikes of the scene of that seed."""
     rng = np.random.default_rng([seed, 1])
     return record(cues(seed), SIDE_M, RECORDED_S, rng)
 
 
 def scene(seed: int) -> Scene:
-    """One scene, recorded and compared."""
+    """Record one scene and compare its posteriors."""
     given = cues(seed)
     spikes = recording(seed)
+
+    # The localization codelet's own rejection of samples.
+    rng = np.random.default_rng([seed, 2])
+    samples = rng.multivariate_normal(given.mean_m, given.covariance_m2, SAMPLES)
+    log_likelihood = np.zeros(SAMPLES)
+    for border in given.borders:
+        log_likelihood -= ((samples[:, border.axis] - border.sensed_m) / border.sd_m) ** 2 / 2
+    kept = samples[rejection_mask(log_likelihood, rng)]
+
     return Scene(
         cues=given,
         exact=exact(given),
         spiking=spikes.posterior,
-        rejection=_rejection(given, seed),
+        rejection=Posterior(kept.mean(axis=0), np.cov(kept, rowvar=False)),
         spikes=int(spikes.counts.sum()),
     )
-
-
-def _rejection(given: Cues, seed: int) -> Posterior:
-    """The posterior by the localization codelet's own rejection of samples."""
-    rng = np.random.default_rng([seed, 2])
-    samples = rng.multivariate_normal(given.mean_m, given.covariance_m2, SAMPLES)
-    squared = []
-    for border in given.borders:
-        residual = (samples[:, border.axis] - border.sensed_m) / border.sd_m
-        squared.append(residual**2)
-
-    log_likelihood = -np.sum(squared, axis=0) / 2
-    is_kept = rejection_mask(log_likelihood, rng)
-    kept = samples[is_kept]
-    return Posterior(kept.mean(axis=0), np.cov(kept, rowvar=False))
 
 
 def measure(setting: Setting, *, seed: int = SEED, folder: Path | None = None) -> Metrics:

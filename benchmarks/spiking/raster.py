@@ -37,7 +37,7 @@ class Train:
         return np.unpackbits(self.spikes)
 
     def times_s(self, first_cycle: int) -> Values:
-        """When it fired within SHOWN_S of `first_cycle`, in seconds from there."""
+        """Return the times of its spikes within SHOWN_S of `first_cycle`, in seconds from there."""
         end_cycle = first_cycle + round(SHOWN_S / GAMMA_S)
         shown = self.cycles[first_cycle:end_cycle]
         cycles = np.flatnonzero(shown).astype(np.float64)
@@ -62,15 +62,11 @@ def draw_raster(axes: Axes, spikes: Recording) -> None:
     for coincidence_s in place.times_s(first_cycle):
         axes.axvline(coincidence_s, color=ESTIMATE, lw=6, alpha=0.15, zorder=0)
 
-    _label(axes, [train.name for train in trains])
-
-
-def _label(axes: Axes, names: list[str]) -> None:
-    axes.set_yticks(range(len(names)), names)
+    axes.set_yticks(range(len(trains)), [train.name for train in trains])
     axes.set_xlim(0, SHOWN_S)
     axes.set_xlabel("seconds", color=FAINT)
     axes.set_title(
-        "d   a place cell and its inputs: it fires where all fire together",
+        "d   a place cell and its inputs: it fires when all fire together",
         loc="left",
         color=INK,
         fontsize=10,

@@ -1,4 +1,4 @@
-"""`cogmap doctor`: what is wrong with this installation and with the running system."""
+"""`cogmap doctor`: finds problems of this installation and of the running system."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from cogmap.schemas import topics
 from cogmap.services import registry
 
 OBSERVE_S = 3.3
+"""Three reports of health a process, which come once a second, and a margin."""
 RUNS = Path("runs")
 
 
@@ -33,8 +34,19 @@ RUNS = Path("runs")
 @connect_option
 @agent_option
 def doctor(as_json: bool, connect: str, agent: str) -> None:
-    """Report what is wrong, and what to do about it; exit code 1 where anything is."""
-    findings = installation.examine(RUNS) + _examine_system(connect, agent)
+    """Find problems of the installation and the running system, and say how to solve them.
+
+    Ends with 1 if there is a problem.
+    """
+    findings = installation.examine(RUNS)
+    try:
+        with observing(connect, agent, "doctor") as bus:
+            observed = observe(bus, OBSERVE_S)
+            findings += system.examine(registry.MODULES, observed, discover(bus.session, agent))
+    except NoRouterError:
+        remedy = "start one with `cogmap run`, or name it with --connect"
+        findings.append(Finding("router", f"none answers at {connect}", remedy))
+
     if as_json:
         click.echo(json.dumps([msgspec.to_builtins(finding) for finding in findings]))
     elif findings:
@@ -44,18 +56,8 @@ def doctor(as_json: bool, connect: str, agent: str) -> None:
     sys.exit(1 if findings else 0)
 
 
-def _examine_system(connect: str, agent: str) -> list[Finding]:
-    try:
-        with observing(connect, agent, "doctor") as bus:
-            observed = observe(bus, OBSERVE_S)
-            return system.examine(registry.MODULES, observed, discover(bus.session, agent))
-    except NoRouterError:
-        remedy = "start one with `cogmap run`, or name it with --connect"
-        return [Finding("router", f"none answers at {connect}", remedy)]
-
-
 def observe(bus: ZenohBus, duration_s: float) -> Observed:
-    """What the processes report about themselves within `duration_s`."""
+    """Collect what the processes report about themselves within `duration_s`."""
     observed = Observed()
     inbox = Inbox()
     intake = Intake()

@@ -1,4 +1,4 @@
-"""What is wrong with this installation."""
+"""Finds problems of this installation."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import platform
 import sys
 from collections.abc import Iterable, Iterator
 from importlib import metadata
+from importlib.util import find_spec
 from pathlib import Path
 
 from packaging.requirements import Requirement
 
 from cogmap.cli.doctor.finding import Finding
-from cogmap.errors import UsageError
 
 OLDEST_PYTHON = (3, 11)
 PACKAGE = "cogmap"
@@ -23,8 +23,8 @@ def examine(runs: Path) -> list[Finding]:
     """All findings about this installation, where runs are kept in `runs`."""
     return [
         *python_version(sys.version_info[:2]),
-        *simulator(sys.version_info[:2], sys.platform, platform.machine()),
-        *dependencies(required(_requirements())),
+        *rendering(sys.version_info[:2], sys.platform, platform.machine()),
+        *dependencies(required(declared())),
         *renderer(),
         *write_access(runs),
     ]
@@ -40,18 +40,19 @@ def python_version(version: tuple[int, int]) -> Iterator[Finding]:
         )
 
 
-def simulator(version: tuple[int, int], system: str, machine: str) -> Iterator[Finding]:
-    """Whether the simulator runs here: pybullet has wheels for one Python and one platform."""
+def rendering(version: tuple[int, int], system: str, machine: str) -> Iterator[Finding]:
+    """Name what keeps camera images from being rendered: pybullet has wheels for one platform."""
     if (version, system, machine) != ((3, 11), "linux", "x86_64"):
         yield Finding(
-            "simulator",
+            "rendering",
             "it needs Python 3.11 on Linux x86-64, as pybullet has no wheel for others",
-            "run it there or in the container; everything else runs here",
+            "drive at the level of percepts (`cogmap run --tour`), or render there or in the "
+            "container; everything else runs here",
         )
 
 
-def _requirements() -> list[str]:
-    """What the installed package declares that it needs."""
+def declared() -> list[str]:
+    """The requirements that the installed package declares."""
     try:
         return metadata.requires(PACKAGE) or []
     except metadata.PackageNotFoundError:
@@ -90,11 +91,11 @@ def dependencies(requirements: Iterable[Requirement]) -> Iterator[Finding]:
 
 
 def renderer() -> Iterator[Finding]:
-    """Whether the simulator can render with EGL."""
-    try:
-        from cogmap.services.sim.rendering import egl_trial
-    except (ImportError, UsageError):  # the missing dependency is a finding of its own
+    """Whether EGL renders the camera images; without pybullet nothing does."""
+    if find_spec("pybullet") is None:
         return
+
+    from cogmap.services.sim.rendering import egl_trial
 
     if not egl_trial.works():
         yield Finding(

@@ -1,4 +1,4 @@
-"""What is wrong with a running system, from what its processes report in a few seconds."""
+"""Finds problems of a running system, by what its processes report in a few seconds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from cogmap.cli.doctor.finding import Finding
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock, Health
-from cogmap.schemas.topics import Scope, Topic
+from cogmap.schemas.topics import Scope
 
 RATE_TOLERANCE = 0.3
 MIN_MEASURED_HZ = 1.0
@@ -22,9 +22,8 @@ MIN_REPORTS = 2
 
 @dataclass
 class Observed:
-    """What was observed: `health` has each instance's reports in order.
-
-    `clock_rate` is simulated seconds a second, None where no clock was received.
+    """The observations: `health` has each instance's reports in order; `clock_rate` is simulated
+    seconds a second, None if no clock was received.
     """
 
     ready: set[Member] = field(default_factory=set)
@@ -47,7 +46,7 @@ def examine(expected: Iterable[str], observed: Observed, system: System) -> list
         *silent(expected, observed),
         *not_ready(observed),
         *complaints(observed),
-        *off_rate(observed, system),
+        *wrong_rates(observed, system),
         *truth_leaks(expected, system),
     ]
 
@@ -87,45 +86,35 @@ def complaints(observed: Observed) -> Iterator[Finding]:
     """Losses, rejected messages, growing queues and notes that the instances report."""
     for instance, reports in sorted(observed.health.items()):
         last = reports[-1]
-        yield from _losses(instance, last)
-        yield from _rejections(instance, last)
-        yield from _growing_queue(instance, reports)
+        for name, number in sorted(last.gaps.items()):
+            if number:
+                yield Finding(
+                    instance,
+                    f"{number} messages of {name} never reached it",
+                    "see whether its queue is full, or the link",
+                )
+
+        for name, number in sorted(last.rejected.items()):
+            if number:
+                yield Finding(
+                    instance,
+                    f"it rejected {number} messages of {name}",
+                    "its log names them: correct their publisher",
+                )
+
+        queued = [report.queued for report in reports]
+        is_growing = all(later > earlier for earlier, later in pairwise(queued))
+        if is_growing and queued[-1] >= LONG_QUEUE:
+            yield Finding(
+                instance,
+                f"its queue grows, to {queued[-1]} messages",
+                "give it a core of its own, or lower the rates of its inputs",
+            )
         for note in last.notes:
             yield Finding(instance, note, "see its log")
 
 
-def _losses(instance: str, health: Health) -> Iterator[Finding]:
-    for name, number in sorted(health.gaps.items()):
-        if number:
-            yield Finding(
-                instance,
-                f"{number} messages of {name} never reached it",
-                "see whether its queue is full, or the link",
-            )
-
-
-def _rejections(instance: str, health: Health) -> Iterator[Finding]:
-    for name, number in sorted(health.rejected.items()):
-        if number:
-            yield Finding(
-                instance,
-                f"it rejected {number} messages of {name}",
-                "its log names them: mend their publisher",
-            )
-
-
-def _growing_queue(instance: str, reports: list[Health]) -> Iterator[Finding]:
-    queued = [report.queued for report in reports]
-    is_growing = all(later > earlier for earlier, later in pairwise(queued))
-    if is_growing and queued[-1] >= LONG_QUEUE:
-        yield Finding(
-            instance,
-            f"its queue grows, to {queued[-1]} messages",
-            "give it a core of its own, or lower the rates of its inputs",
-        )
-
-
-def off_rate(observed: Observed, system: System) -> Iterator[Finding]:
+def wrong_rates(observed: Observed, system: System) -> Iterator[Finding]:
     """Topics whose rate is not the table's, as far as a few seconds of real time can show."""
     clock_rate = 1.0 if observed.clock_rate is None else observed.clock_rate
     if clock_rate == 0:
@@ -133,18 +122,17 @@ def off_rate(observed: Observed, system: System) -> Iterator[Finding]:
 
     measured = rates_hz(observed.health.values())
     for topic in topics.ALL:
-        if topic.name in measured and system.doing(Role.PUBLISHES, topic):
-            yield from _off_rate(topic, measured[topic.name], topic.rate_hz * clock_rate)
+        is_published = topic.name in measured and system.doing(Role.PUBLISHES, topic)
+        if not is_published or topic.rate_hz < MIN_MEASURED_HZ:
+            continue
 
-
-def _off_rate(topic: Topic, measured_hz: float, expected_hz: float) -> Iterator[Finding]:
-    is_measurable = topic.rate_hz >= MIN_MEASURED_HZ
-    if is_measurable and abs(measured_hz - expected_hz) > RATE_TOLERANCE * expected_hz:
-        yield Finding(
-            topic.name,
-            f"{measured_hz:.1f} Hz, the table has {expected_hz:g} Hz",
-            f"see with `cogmap topic delay {topic.name}` where the time goes",
-        )
+        expected_hz = topic.rate_hz * clock_rate
+        if abs(measured[topic.name] - expected_hz) > RATE_TOLERANCE * expected_hz:
+            yield Finding(
+                topic.name,
+                f"{measured[topic.name]:.1f} Hz, the table has {expected_hz:g} Hz",
+                f"see with `cogmap topic delay {topic.name}` where the time goes",
+            )
 
 
 def rates_hz(reports_of: Iterable[list[Health]]) -> dict[str, float]:

@@ -43,7 +43,7 @@ Examples:
     "--osm",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Streets and buildings of an OpenStreetMap extract.",
+    help="Take streets and buildings from an OpenStreetMap extract.",
 )
 @click.option(
     "--all",
@@ -56,7 +56,7 @@ Examples:
 @click.option(
     "--maps",
     type=click.IntRange(1, 1000),
-    help="So many maps of eight buildings.  "
+    help="Maps of eight buildings each.  "
     f"[default: {MAPS} from a seed or --osm, one a city with --all]",
 )
 @click.option(
@@ -64,7 +64,7 @@ Examples:
     type=click.IntRange(1, 1000),
     default=TRAVERSALS,
     show_default=True,
-    help="Of each map.",
+    help="Traversals of each map.",
 )
 @click.option(
     "--noise",
@@ -73,12 +73,12 @@ Examples:
     default=(NOISE.speed, NOISE.turn, NOISE.drift_rad_per_sqrt_m),
     show_default=True,
     metavar="SPEED TURN DRIFT",
-    help="Of self-motion: shares of speed and of turn, and radians of drift after a metre.",
+    help="Noise of self-motion: shares of speed and of turn, and drift in radians after a metre.",
 )
 @click.option(
     "--fit",
     is_flag=True,
-    help="Fit that noise first, so that maps err as people's do; takes many times as long.",
+    help="Fit that noise to the errors of people first; takes many times as long.",
 )
 @common_options
 def city_maps(
@@ -93,9 +93,9 @@ def city_maps(
     """Experiment 2, figure 8: the maps that an agent learns of cities, with their loops closed and
     not.
 
-    Eight buildings in at most 4 km², the shortest tour past all of them along the streets, driven
-    anew so often by an agent that knows nothing, from any of the buildings. Percepts are not drawn:
-    they err as perception was measured to.
+    Each map has eight buildings in at most 4 km². An agent that knows nothing drives the shortest
+    tour past them along the streets, from any of the buildings. Percepts are not rendered: they
+    have the measured errors of perception.
     """
     out = results.folder_for(NAME, common.out)
     places = _places(osm, all_in, maps, common.seed)

@@ -23,7 +23,7 @@ NAME = "cue-integration"
 _EPILOG = """\b
 Examples:
   cogmap experiment cue-integration --json cue.json
-  cogmap experiment cue-integration --fit             fit the noise of self-motion anew
+  cogmap experiment cue-integration --fit             fit the noise of self-motion first
   cogmap experiment cue-integration --distance-noise 0.1   landmarks about as good as self-motion
 """
 
@@ -34,26 +34,28 @@ Examples:
     type=click.IntRange(8, 100_000),
     default=200,
     show_default=True,
-    help="So many of each condition.",
+    help="Trials of each condition.",
 )
 @click.option(
     "--distance-noise",
     type=FiniteRange(0.001, 0.5),
     default=FITTED.distance,
     show_default=True,
-    help="Of distances to landmarks, and of directions in rad.",
+    help="Noise of distances to landmarks, as a share, and of directions, in rad.",
 )
 @click.option(
-    "--fit", is_flag=True, help="Fit the noise of self-motion first; else take what a fit gave."
+    "--fit",
+    is_flag=True,
+    help="Fit the noise of self-motion first; otherwise it is known from a fit.",
 )
 @common_options
 def cue_integration(common: Common, trials: int, distance_noise: float, fit: bool) -> None:
-    """Experiment 1, figure 7: a post is carried back to its place in the dark, by self-motion,
-    landmarks, or both.
+    """Experiment 1, figure 7: an agent carries a post back to its place in the dark, guided by
+    self-motion, landmarks, or both.
 
-    In Nardini's room, with four conditions: self-motion alone, landmarks alone after
-    disorientation, both, and both in conflict, landmarks turned by 15°. The published results
-    beside ours are a simulation's, not people's.
+    It is in Nardini's room. There are four conditions: self-motion alone, landmarks alone after
+    disorientation, both, and both in conflict, with landmarks turned by 15°. The published results
+    beside ours are those of a simulation, not of people.
     """
     folder = results.folder_for(NAME, common.out)
     noise = Noise(FITTED.speed, FITTED.turn, distance_noise)

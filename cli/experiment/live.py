@@ -75,40 +75,21 @@ def run(
 
         supervisor = Supervisor(folder)
         stack.callback(lambda: supervisor.end(list(supervisor.children), GRACE_S))
-        for program in _programs(folder, endpoint, instances):
-            supervisor.start(program)
+        where = ["--tied", "--connect", endpoint]
+        supervisor.start(Program.of(ROUTER, cogmap_command("router", *where)))
+        config = ["--agent", AGENT, "--config", str(folder / CONFIG_NAME)]
+        for module, instance in instances:
+            command = cogmap_command("module", module, "--instance", instance, *where, *config)
+            supervisor.start(Program.of(instance, command))
 
         shells = [Shell(module, ZenohBus(endpoint, AGENT), health=False) for module in here]
         for shell in shells:
             stack.callback(shell.close)
             shell.open()
 
-        _spin(shells, supervisor, is_done)
-
-
-def _spin(shells: Sequence[Shell], supervisor: Supervisor, is_done: Callable[[], bool]) -> None:
-    until_s = time.monotonic() + TIMEOUT_S
-
-    while not is_done() and time.monotonic() < until_s:
-        had_work = [shell.spin_once(SPIN_S) for shell in shells]
-        if any(had_work):
-            until_s = time.monotonic() + TIMEOUT_S
-        supervisor.check()
-
-
-def _programs(folder: Path, endpoint: str, instances: Sequence[tuple[str, str]]) -> list[Program]:
-    where = ["--tied", "--connect", endpoint]
-    config = ["--agent", AGENT, "--config", str(folder / CONFIG_NAME)]
-    programs = [_program(ROUTER, ["router", *where])]
-
-    for module, instance in instances:
-        arguments = ["module", module, "--instance", instance, *where, *config]
-        programs.append(_program(instance, arguments))
-
-    return programs
-
-
-def _program(name: str, arguments: list[str]) -> Program:
-    """A process that is started again by the same command."""
-    command = cogmap_command(*arguments)
-    return Program(name, lambda starts: command)
+        until_s = time.monotonic() + TIMEOUT_S
+        while not is_done() and time.monotonic() < until_s:
+            had_work = [shell.spin_once(SPIN_S) for shell in shells]
+            if any(had_work):
+                until_s = time.monotonic() + TIMEOUT_S
+            supervisor.check()

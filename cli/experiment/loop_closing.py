@@ -26,11 +26,11 @@ Examples:
 @click.command(name=NAME, epilog=_EPILOG)
 @common_options
 def loop_closing(common: Common) -> None:
-    """Figure 6: a path round some blocks, before and after its loop is closed by reverse replay.
+    """Figure 6: a path around some blocks, before and after its loop is closed by reverse replay.
 
-    Driven twice, with positions corrected, which is the paper's rule, and with headings too.
-    Percepts are not drawn: they err as perception was measured to; --cameras drives once more and
-    draws them. Takes about a minute, or two.
+    The agent drives twice: positions are corrected, by the paper's rule, or headings too. Percepts
+    are not rendered: they have the measured errors of perception. --cameras drives once more with
+    rendered images. Takes one or two minutes.
     """
     folder = results.folder_for(NAME, common.out)
     loops = _drive(common)

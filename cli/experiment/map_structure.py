@@ -41,9 +41,9 @@ def map_structure(common: Common, osm: Path | None, all_in: Path | None) -> None
     """Sub-maps of real cities, found by the model that structures the agent's map.
 
     Objects are buildings, and places that people use; their functions come from tags. Railways,
-    water, walls and main roads are boundaries. Nobody knows the true sub-maps: how many there are,
-    how large, how often a boundary is between neighbours, and how many stay the same where
-    positions err by 2 m. Where an extract names quarters, the agreement with the nearest of those.
+    water, walls and main roads are boundaries. The true sub-maps are not known. So the metrics are
+    their number and size, how often a boundary separates neighbours, and how many stay the same
+    when positions err by 2 m; and the agreement with quarters, if an extract names them.
     """
     folder = results.folder_for(NAME, common.out)
     cities = _cities(osm, all_in)

@@ -40,12 +40,12 @@ _SENSING_OPTIONS = (
     click.option(
         "--cameras",
         is_flag=True,
-        help="Run one more with cameras: percepts come from drawn images, by sensory and epam.",
+        help="Run once more with rendered camera images, perceived by sensory and epam.",
     ),
     click.option(
         "--live",
         is_flag=True,
-        help="Run one more through real processes and compare bytes; code 1 where they differ.",
+        help="Run once more with real processes, and compare bytes; ends with 1 if they differ.",
     ),
 )
 _OPTIONS = (
@@ -54,18 +54,18 @@ _OPTIONS = (
         type=click.IntRange(0, 2**32),
         default=1,
         show_default=True,
-        help="Of all noise; the same seed gives the same bytes.",
+        help="Seed of all noise; the same seed gives the same bytes.",
     ),
     click.option(
         "--processes",
         type=click.IntRange(1, 256),
         default=os.cpu_count() or 1,
-        help="How many run at once; the metrics do not depend on it.  [default: one a core]",
+        help="Processes that run at once; metrics do not depend on it.  [default: one per core]",
     ),
     click.option(
         "--out",
         type=click.Path(path_type=Path),
-        help="A folder for its files.  [default: runs/NAME]",
+        help="The folder for its files.  [default: runs/NAME]",
     ),
     click.option(
         "--json",
@@ -73,7 +73,7 @@ _OPTIONS = (
         type=click.Path(dir_okay=False, path_type=Path),
         callback=_writable,
         metavar="FILE",
-        help="Write the metrics there too, as one flat object.",
+        help="Write the metrics to FILE too, as one flat JSON object.",
     ),
 )
 

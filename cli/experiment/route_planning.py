@@ -44,21 +44,21 @@ Examples:
     type=click.IntRange(1, 10_000),
     default=PARTICIPANTS,
     show_default=True,
-    help="Simulated, of each problem that people drew tours of.",
+    help="Simulated participants for each problem in --data.",
 )
 @click.option(
     "--drawn",
     type=click.IntRange(1, 1000),
     default=DRAWN,
     show_default=True,
-    help="So many problems drawn at random of each number of goals.",
+    help="Random problems of each number of goals.",
 )
 @click.option(
     "--max-goals",
     type=click.IntRange(EXAMPLE_GOALS, SIZES[-1]),
     default=SIZES[-1],
     show_default=True,
-    help=f"Of drawn problems: from {SIZES[0]} up to this number.",
+    help=f"Largest number of goals of random problems; the smallest is {SIZES[0]}.",
 )
 @common_options_without_sensing
 def route_planning(

@@ -18,8 +18,8 @@ from cogmap.recording.log import open_log
 PICTURES = (".png", ".svg")
 _EPILOG = """\b
 Examples:
-  cogmap explain drive.mcap                  the last broadcast
-  cogmap explain runs/latest --at 12.5       of a run's log, that time of the drive
+  cogmap explain drive.mcap                  the cycle of the last broadcast
+  cogmap explain runs/latest --at 12.5       12.5 s into the last run
   cogmap explain drive.mcap --cycle 60 --picture cycle.png
 """
 
@@ -31,27 +31,31 @@ Examples:
     "at_s",
     type=FiniteRange(min=0),
     metavar="SECONDS",
-    help="The last cycle whose view is at or before this time of the drive.",
+    help="Explain the cycle at this time of the drive.",
 )
 @click.option(
-    "--cycle", "number", type=click.IntRange(min=0), metavar="N", help="The cycle of this number."
+    "--cycle",
+    "number",
+    type=click.IntRange(min=0),
+    metavar="N",
+    help="Explain the cycle with this number.",
 )
 @click.option(
     "--picture",
     "picture",
     type=click.Path(path_type=Path),
     metavar="FILE",
-    help="Draw the cycle, as PNG or SVG.",
+    help="Draw the cycle too, as PNG or SVG.",
 )
 @json_option
 def explain(
     log: Path, at_s: float | None, number: int | None, picture: Path | None, as_json: bool
 ) -> None:
-    """Explain one moment of the drive in LOG, which may be a run's folder.
+    """Explain one cognitive cycle of the drive in LOG, a log or the folder of a run.
 
-    What was perceived, which coalitions competed and why one became conscious, which action that
-    led to and why no other, and the motor command that followed. Without --at or --cycle it is the
-    last broadcast.
+    Shows what was perceived, which coalitions competed and why one became conscious, which action
+    was chosen and why no other, and the motor command that followed. Without --at or --cycle it is
+    the cycle of the last broadcast.
     """
     if at_s is not None and number is not None:
         raise click.UsageError("--at and --cycle both name a moment: leave one out")

@@ -8,7 +8,6 @@ from cogmap.cli.explain import reasons
 from cogmap.cli.explain.moment import Moment
 from cogmap.cli.explain.reading import Logged
 from cogmap.schemas.base import Message
-from cogmap.schemas.graph import Delta
 from cogmap.schemas.render import to_jsonable
 
 _IN_FULL = ("percepts", "competition", "broadcast", "earlier_broadcast", "action", "earlier_action")
@@ -32,7 +31,17 @@ def facts(moment: Moment) -> dict[str, Any]:
         found[name] = _in_full(getattr(moment, name))
 
     found["command"] = _in_full(moment.command)
-    found["workspace"] = [_commit(delta) for delta in moment.deltas]
+    found["workspace"] = [
+        {
+            "after_ms": delta.after_ms,
+            "phase": delta.message.phase.value,
+            "tasks": delta.message.tasks,
+            "operations": len(delta.message.operations),
+            "rejected": delta.message.rejected,
+            "reasons": delta.message.reasons,
+        }
+        for delta in moment.deltas
+    ]
     found["winner"] = moment.winner or None
     found["entered"] = entered
     found["why_conscious"] = reasons.of_competition(moment)
@@ -46,15 +55,3 @@ def _in_full(logged: Logged[Any] | None) -> dict[str, Any] | None:
 
     message: Message = logged.message
     return {"after_ms": logged.after_ms, "message": to_jsonable(message)}
-
-
-def _commit(delta: Logged[Delta]) -> dict[str, Any]:
-    message = delta.message
-    return {
-        "after_ms": delta.after_ms,
-        "phase": message.phase.value,
-        "tasks": message.tasks,
-        "operations": len(message.operations),
-        "rejected": message.rejected,
-        "reasons": message.reasons,
-    }

@@ -1,4 +1,4 @@
-"""Nodes, percepts and commands in words."""
+"""Describes nodes, percepts and commands in words."""
 
 from __future__ import annotations
 
@@ -39,17 +39,20 @@ def of_node(node: GraphNode) -> str:
     """A node: the agent's pose, an object's label, a goal's name, what a plan comes to."""
     match node:
         case Self():
-            words = f"the agent at {_position(node.x_m, node.y_m)}, {_heading(node.heading_rad)}"
+            degrees = round(math.degrees(math.remainder(node.heading_rad, math.tau)))
+            words = f"the agent at {_position(node.x_m, node.y_m)}, heading {degrees}°"
         case Object() | PerceptNode():
             words = spoken(node.label)
         case Goal():
-            words = _goal(node)
+            words = of_goal(node)
         case Plan():
-            words = _plan(node)
+            words = of_plan(node)
         case Map():
             words = _map(node.id)
         case Episode():
-            words = _episode(node)
+            labels = ", ".join(spoken(each.label) for each in node.content[:NAMED])
+            place = _position(node.x_m, node.y_m)
+            words = f"the episode at {place} in run {node.run}: {labels}"
         case _:
             words = spoken(f"{kind_of(node)} {node.id}")
     return words
@@ -104,19 +107,22 @@ def bearing(bearing_rad: float) -> str:
 
 def of_command(command: MotorCommand) -> str:
     """How a command moves the robot, and what limits it."""
-    motion = _motion(command.left_wheel_rad_s, command.right_wheel_rad_s)
+    moved = motion(command.left_wheel_rad_s, command.right_wheel_rad_s)
     limits = []
     if command.halted_by is not SpeedLimit.NONE:
         limits.append(f"halted by {command.halted_by.value}")
     if command.slowed_by is not SpeedLimit.NONE:
         limits.append(f"slowed by {command.slowed_by.value}")
-    return ", ".join([motion, *limits])
+    return ", ".join([moved, *limits])
 
 
 def codelets(delta: Delta) -> str:
     """The codelets whose answers a delta commits, each with the number of its answers."""
-    numbers = Counter(_codelet(task) for task in delta.tasks)
-    return counted(numbers.elements())
+    named = []
+    for task in delta.tasks:  # its id is the cycle, the codelet, and perhaps its subject
+        codelet = task.partition("/")[2].partition("/")[0]
+        named.append(codelet or task)
+    return counted(named)
 
 
 def counted(names: Iterable[str]) -> str:
@@ -128,14 +134,8 @@ def counted(names: Iterable[str]) -> str:
     return ", ".join(words)
 
 
-def _codelet(task: str) -> str:
-    """The codelet of a task's id, which is its cycle, the codelet, and perhaps its subject."""
-    _, _, rest = task.partition("/")
-    name, _, _ = rest.partition("/")
-    return name or task
-
-
-def _goal(goal: Goal) -> str:
+def of_goal(goal: Goal) -> str:
+    """A goal: its object, or its name and position."""
     if goal.object:
         return f"the goal {spoken(goal.object)}"
 
@@ -146,7 +146,8 @@ def _goal(goal: Goal) -> str:
     return f"the goal {spoken(name)} at {place}"
 
 
-def _plan(plan: Plan) -> str:
+def of_plan(plan: Plan) -> str:
+    """What a plan comes to."""
     if plan.state is not PlanState.READY:
         return f"the plan: {plan.state.value}"
 
@@ -163,12 +164,6 @@ def _plan(plan: Plan) -> str:
     return f"the plan to go to {name}, {length}{doubt}{detour}"
 
 
-def _episode(episode: Episode) -> str:
-    labels = [spoken(node.label) for node in episode.content[:NAMED]]
-    place = _position(episode.x_m, episode.y_m)
-    return f"the episode at {place} in run {episode.run}: {', '.join(labels)}"
-
-
 def _map(identifier: str) -> str:
     number = map_number(identifier)
     if number is not None:
@@ -179,21 +174,12 @@ def _map(identifier: str) -> str:
 
 
 def _position(x_m: float, y_m: float) -> str:
-    return f"({_number(x_m)}, {_number(y_m)}) m"
-
-
-def _heading(heading_rad: float) -> str:
-    degrees = round(math.degrees(math.remainder(heading_rad, math.tau)))
-    return f"heading {degrees}°"
-
-
-def _number(value: float) -> str:
     """With one decimal, and never as minus zero."""
-    rounded = round(value, 1) + 0.0
-    return f"{rounded:.1f}"
+    return f"({round(x_m, 1) + 0.0:.1f}, {round(y_m, 1) + 0.0:.1f}) m"
 
 
-def _motion(left_rad_s: float, right_rad_s: float) -> str:
+def motion(left_rad_s: float, right_rad_s: float) -> str:
+    """How the robot moves with these speeds of its wheels."""
     fastest = max(abs(left_rad_s), abs(right_rad_s))
     if fastest == 0.0:
         return "stand still"

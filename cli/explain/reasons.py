@@ -1,8 +1,6 @@
-"""Why one coalition became conscious, or none; why one action was chosen, or none: in sentences."""
+"""Gives the reasons, in sentences, for what became conscious and for the chosen action."""
 
 from __future__ import annotations
-
-from collections.abc import Sequence
 
 from cogmap.cli.explain.moment import Moment
 from cogmap.cli.explain.names import spoken
@@ -34,19 +32,24 @@ def of_competition(moment: Moment) -> list[str]:
     competition = moment.competition.message
     winner = won(competition)
     if winner is None or not competition.trigger:
-        return [_why_none(moment, competition)]
-    return [_why_most_active(competition, winner), _why_now(moment, competition)]
+        return [why_none(moment, competition)]
+    return [why_most_active(competition, winner), why_now(moment, competition)]
 
 
 def of_action(moment: Moment) -> list[str]:
-    """Why the action was chosen; where none was, what goes on."""
+    """Why the action was chosen; if none was, which one continues."""
     if moment.action is not None:
-        return _why_chosen(moment.action.message)
+        return why_chosen(moment.action.message)
+
+    continues = "there is no action yet"
+    if moment.earlier_action is not None:
+        action = moment.earlier_action.message
+        continues = f"{spoken(action.scheme)}, chosen in cycle {action.cycle}, continues"
     if moment.broadcast is None:
-        return [f"Without a broadcast nothing is chosen: {_what_goes_on(moment)}."]
+        return [f"Without a broadcast nothing is chosen: {continues}."]
     return [
         "The broadcast led to no action: no behaviour was active enough, or the log ends before "
-        f"it; {_what_goes_on(moment)}."
+        f"it; {continues}."
     ]
 
 
@@ -86,7 +89,7 @@ def chosen(behaviour: Behaviour) -> str:
     return f"rejected: {behaviour.rejection.value}"
 
 
-def _why_most_active(competition: Competition, winner: Contender) -> str:
+def why_most_active(competition: Competition, winner: Contender) -> str:
     name = _beginning(winner.codelet)
     others = [each for each in _competing(competition) if each.id != winner.id]
     rival = max(others, key=lambda each: each.activation, default=None)
@@ -102,10 +105,10 @@ def _why_most_active(competition: Competition, winner: Contender) -> str:
     return f"{name} won, though {rival_name} was more active by {-margin:.2f}."
 
 
-def _why_now(moment: Moment, competition: Competition) -> str:
+def why_now(moment: Moment, competition: Competition) -> str:
     """What triggered the broadcast, with the figures where the trigger is one known here."""
     settings = moment.settings
-    activations = _activations(competition)
+    activations = [each.activation for each in _competing(competition)]
     strongest = max(activations)
     silent_s = _silent_s(moment)
     figures = ""
@@ -115,24 +118,23 @@ def _why_now(moment: Moment, competition: Competition) -> str:
         case Trigger.AGGREGATE:
             figures = f", {sum(activations):.2f} over {settings.aggregate_above:.2f}"
         case Trigger.NO_BROADCAST if silent_s is not None:
-            figures = (
-                f", {silent_s:.2f} s where {_seconds(settings.no_broadcast_ticks):.2f} s suffice"
-            )
+            limit_s = settings.no_broadcast_ticks * TICK_MS / 1e3
+            figures = f", {silent_s:.2f} s where {limit_s:.2f} s suffice"
     return f"The broadcast was triggered by: {competition.trigger.value}{figures}."
 
 
-def _why_none(moment: Moment, competition: Competition) -> str:
+def why_none(moment: Moment, competition: Competition) -> str:
     """Why a competition triggered no broadcast, by the settings of the global workspace."""
     if competition.trigger:
         return f"A broadcast was triggered by: {competition.trigger.value}; the log has no winner."
 
-    activations = _activations(competition)
+    activations = [each.activation for each in _competing(competition)]
     if not activations:
         return "It triggered no broadcast: no coalition was left to compete."
 
     settings = moment.settings
     silent_s = _silent_s(moment)
-    refractory_s = _seconds(settings.refractory_ticks)
+    refractory_s = settings.refractory_ticks * TICK_MS / 1e3
     if silent_s is not None and silent_s < refractory_s:
         return (
             f"It triggered no broadcast, being refractory: the last was {silent_s:.2f} s before, "
@@ -146,12 +148,12 @@ def _why_none(moment: Moment, competition: Competition) -> str:
         f"{settings.aggregate_above:.2f}",
     ]
     if silent_s is not None:
-        limit_s = _seconds(settings.no_broadcast_ticks)
+        limit_s = settings.no_broadcast_ticks * TICK_MS / 1e3
         needs.append(f"the last broadcast was {silent_s:.2f} s before, short of {limit_s:.2f} s")
     return f"It triggered no broadcast: {'; '.join(needs)}."
 
 
-def _why_chosen(action: Action) -> list[str]:
+def why_chosen(action: Action) -> list[str]:
     name = _beginning(action.scheme)
     rival = next_best(action)
     if rival is None:
@@ -170,20 +172,9 @@ def _beginning(name: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _what_goes_on(moment: Moment) -> str:
-    if moment.earlier_action is None:
-        return "there is no action yet"
-    action = moment.earlier_action.message
-    return f"{spoken(action.scheme)}, chosen in cycle {action.cycle}, goes on"
-
-
 def _competing(competition: Competition) -> list[Contender]:
     """The contenders that were there when the broadcast was triggered."""
     return [each for each in competition.contenders if each.fate not in OUT_OF_IT]
-
-
-def _activations(competition: Competition) -> Sequence[float]:
-    return [each.activation for each in _competing(competition)]
 
 
 def _silent_s(moment: Moment) -> float | None:
@@ -191,7 +182,3 @@ def _silent_s(moment: Moment) -> float | None:
     if moment.earlier_broadcast is None:
         return None
     return (moment.stamp_ns - moment.earlier_broadcast.message.stamp_ns) / 1e9
-
-
-def _seconds(ticks: int) -> float:
-    return ticks * TICK_MS / 1e3

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -25,11 +27,8 @@ def print_moment(moment: Moment) -> None:
     title.append(f"  {moment.path}", FAINT)
     console.print(title)
     console.print()
-    console.print(_table(stages(moment)))
 
-
-def _table(shown: list[Stage]) -> Table:
-    """A row a stage: its title and when it was done, and beside these what was in it."""
+    shown = stages(moment)
     table = Table.grid(padding=(0, 2))
     table.add_column(style=TITLE, no_wrap=True)
     table.add_column(style=FAINT, justify="right", no_wrap=True)
@@ -38,23 +37,15 @@ def _table(shown: list[Stage]) -> Table:
         table.add_row(stage.title, delay(stage.after_ms), _inside(stage))
         if stage is not shown[-1]:
             table.add_row()
-    return table
+    console.print(table)
 
 
 def _inside(stage: Stage) -> Group:
     """The rows of a stage, and below them why."""
     parts: list[RenderableType] = []
-    together: list[Row] = []
-    for row in stage.rows:
-        if together and len(together[0].cells) != len(row.cells):
-            parts.append(_columns(together))
-            together = []
-        together.append(row)
-
-    if together:
-        parts.append(_columns(together))
-    for sentence in stage.why:
-        parts.append(Text(sentence, "italic"))
+    for _, rows in groupby(stage.rows, key=lambda row: len(row.cells)):
+        parts.append(_columns(list(rows)))
+    parts += [Text(sentence, "italic") for sentence in stage.why]
     return Group(*parts)
 
 

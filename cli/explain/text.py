@@ -1,4 +1,4 @@
-"""A moment as people read it: its stages in order, each with what was in it, and why."""
+"""Describes a moment to people: its stages in order, each with its contents and the reasons."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 
 from cogmap.cli.explain import names, reasons
 from cogmap.cli.explain.moment import Moment
-from cogmap.cli.explain.reading import Logged
-from cogmap.schemas.cognition import Contender, Fate, Rejection
+from cogmap.schemas.cognition import Fate, Rejection
 from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.sensing import Percepts
 
@@ -42,12 +41,12 @@ def headline(moment: Moment) -> str:
 def stages(moment: Moment) -> list[Stage]:
     """The stages of the cycle, in order."""
     return [
-        _perceived(moment),
-        _workspace(moment),
-        _competition(moment),
-        _conscious(moment),
-        _action(moment),
-        _command(moment),
+        perceived(moment),
+        workspace(moment),
+        competition(moment),
+        conscious(moment),
+        action(moment),
+        command(moment),
     ]
 
 
@@ -96,17 +95,17 @@ def since(moment: Moment, name: str) -> str:
 
 def phases(moment: Moment) -> list[tuple[float | None, str, str]]:
     """What the workspace did, in order: when, in which phase, whose answers it committed."""
-    rows = []
-    for delta in moment.deltas:
-        if delta.message.operations or delta.message.tasks:
-            rows.append((delta.after_ms, delta.message.phase.value, committed(delta.message)))
+    shown = [each for each in moment.deltas if each.message.operations or each.message.tasks]
+    rows = [(each.after_ms, each.message.phase.value, committed(each.message)) for each in shown]
 
     found = moment.coalitions
     if found is not None:
         makers = [coalition.codelet for coalition in found.message.coalitions]
-        what = f"{names.counted(makers)}: {_coalitions(len(makers))}" if makers else "no coalition"
-        row = (found.after_ms, Phase.ATTENTION.value, what)
-        rows.insert(_place_of(found.time_s, moment.deltas, len(rows)), row)
+        plural = "" if len(makers) == 1 else "s"
+        what = f"{names.counted(makers)}: {len(makers)} coalition{plural}"
+        row = (found.after_ms, Phase.ATTENTION.value, what if makers else "no coalition")
+        earlier = sum(delta.time_s <= found.time_s for delta in shown)
+        rows.insert(earlier, row)
     return rows
 
 
@@ -123,20 +122,8 @@ def conscious_before(moment: Moment) -> str:
     return f"last, in cycle {message.cycle}, {ago_s:.2f} s before: {name}: {words}"
 
 
-def _coalitions(number: int) -> str:
-    return f"{number} coalition{'' if number == 1 else 's'}"
-
-
-def _place_of(time_s: float, deltas: list[Logged[Delta]], end: int) -> int:
-    """Before which of the deltas that are shown something received at `time_s` belongs."""
-    shown = [each for each in deltas if each.message.operations or each.message.tasks]
-    for number, delta in enumerate(shown):
-        if delta.time_s > time_s:
-            return number
-    return end
-
-
-def _perceived(moment: Moment) -> Stage:
+def perceived(moment: Moment) -> Stage:
+    """The objects that were recognised in the view."""
     if moment.percepts is None:
         return Stage("perceived", None, [Row((NOT_IN_LOG,))])
 
@@ -150,7 +137,8 @@ def _perceived(moment: Moment) -> Stage:
     return Stage("perceived", moment.percepts.after_ms, rows)
 
 
-def _workspace(moment: Moment) -> Stage:
+def workspace(moment: Moment) -> Stage:
+    """The answers that the workspace committed, and those that it rejected."""
     rows = [Row((delay(after_ms), phase, what)) for after_ms, phase, what in phases(moment)]
     after_ms = moment.deltas[-1].after_ms if moment.deltas else None
     why = []
@@ -161,30 +149,29 @@ def _workspace(moment: Moment) -> Stage:
     return Stage("workspace", after_ms, rows or [Row((NOT_IN_LOG,))], why)
 
 
-def _competition(moment: Moment) -> Stage:
+def competition(moment: Moment) -> Stage:
+    """The coalitions that competed for consciousness."""
     why = reasons.of_competition(moment)
     if moment.competition is None:
         return Stage("competition", None, why=why)
 
     ordered = reasons.ranked_contenders(moment.competition.message)
-    rows = [_contender(moment, each) for each in ordered]
+    rows = []
+    for contender in ordered:
+        entered = moment.entered.get(contender.id)
+        cells = (
+            *_measured(contender.activation),
+            names.spoken(contender.codelet),
+            contender.fate.value,
+            since(moment, contender.id),
+            "" if entered is None else names.brief(entered.coalition),
+        )
+        rows.append(Row(cells, contender.fate is Fate.WON))
     return Stage("competition", moment.competition.after_ms, rows, why)
 
 
-def _contender(moment: Moment, contender: Contender) -> Row:
-    entered = moment.entered.get(contender.id)
-    about = "" if entered is None else names.brief(entered.coalition)
-    cells = (
-        *_measured(contender.activation),
-        names.spoken(contender.codelet),
-        contender.fate.value,
-        since(moment, contender.id),
-        about,
-    )
-    return Row(cells, contender.fate is Fate.WON)
-
-
-def _conscious(moment: Moment) -> Stage:
+def conscious(moment: Moment) -> Stage:
+    """The content that became conscious."""
     if moment.broadcast is None:
         return Stage("conscious", None, [Row((f"nothing new; {conscious_before(moment)}",))])
 
@@ -198,7 +185,8 @@ def _conscious(moment: Moment) -> Stage:
     return Stage("conscious", moment.broadcast.after_ms, rows, why)
 
 
-def _action(moment: Moment) -> Stage:
+def action(moment: Moment) -> Stage:
+    """The action that was selected, and the other behaviours."""
     why = reasons.of_action(moment)
     if moment.action is None:
         return Stage("action", None, why=why)
@@ -211,16 +199,17 @@ def _action(moment: Moment) -> Stage:
     return Stage("action", moment.action.after_ms, rows, why)
 
 
-def _command(moment: Moment) -> Stage:
+def command(moment: Moment) -> Stage:
+    """The command that moved the wheels."""
     if moment.command is None:
         return Stage("command", None, [Row(("none that followed is in the log",))])
 
-    command = moment.command.message
-    wheels = f"{command.left_wheel_rad_s:.1f} and {command.right_wheel_rad_s:.1f} rad/s"
-    rows = [Row((names.of_command(command), wheels), is_chosen=True)]
+    given = moment.command.message
+    wheels = f"{given.left_wheel_rad_s:.1f} and {given.right_wheel_rad_s:.1f} rad/s"
+    rows = [Row((names.of_command(given), wheels), is_chosen=True)]
     why = []
-    if command.stamp_ns != moment.stamp_ns:
-        why.append(f"It answers the next view, that of {command.stamp_ns / 1e9:.3f} s.")
+    if given.stamp_ns != moment.stamp_ns:
+        why.append(f"It answers the next view, that of {given.stamp_ns / 1e9:.3f} s.")
     return Stage("command", moment.command.after_ms, rows, why)
 
 

@@ -9,7 +9,6 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
 from cogmap.cli.launch.observer import Errors, Observer
-from cogmap.geometry.arrays import Floats
 
 PLAIN_PERIOD_S = 5.0
 
@@ -31,18 +30,16 @@ class Display(Protocol):
 
 
 def _drive_line(observer: Observer, errors: Errors) -> str:
+    """Time and distance so far, and the errors at the last estimate; 0 before the first."""
+    estimate_m, fused_m, wheels_m = (
+        float(errors_m[-1]) if errors_m.size else 0.0
+        for errors_m in (errors.estimate_m, errors.fused_m, errors.wheels_m)
+    )
     driven = f"{observer.elapsed_s:5.1f} s  {observer.travelled_m:6.1f} m"
-    estimate_m = _last(errors.estimate_m)
-    fused_m = _last(errors.fused_m)
     alone = f"path integration alone: fused {fused_m:.2f} m"
     if errors.wheels_m.size:
-        alone = f"{alone}, wheels {_last(errors.wheels_m):.2f} m"
-
+        alone = f"{alone}, wheels {wheels_m:.2f} m"
     return f"{driven}  position error {estimate_m:.2f} m; {alone}"
-
-
-def _last(errors_m: Floats) -> float:
-    return float(errors_m[-1]) if errors_m.size else 0.0
 
 
 def _waiting_line(names: list[str]) -> str:

@@ -25,6 +25,7 @@ from cogmap.cli.launch.plan import (
     to_toml,
 )
 from cogmap.cli.launch.supervisor import Supervisor
+from cogmap.cli.launch.tally import Tally
 from cogmap.cli.launch.watch import Watch
 from cogmap.cli.launch.watchdog import REMEDY, Situation, Watchdog
 from cogmap.errors import ProcessFailedError
@@ -89,17 +90,18 @@ class Drive:
         return watch, ending
 
     def _drive(self, watch: Watch, until_s: float, stop: Stop, display: Display) -> Ending:
+        observer = watch.tally.observer
         try:
             ending = self._await_recorder(watch, until_s, stop)
             if ending is None:
                 self.supervisor.release()
                 ending = self._follow(watch, until_s, stop, display)
         except ProcessFailedError as error:
-            if watch.tally.observer.start is None:
+            if observer.start is None:
                 raise
             return Ending(Outcome.MODULE_FAILED, str(error))
 
-        if self.sections["run"]["lockstep"] and watch.tally.observer.has_ended:
+        if self.sections["run"]["lockstep"] and observer.has_ended:
             watch.pump_until_quiet(QUIET_S)
         return ending
 
@@ -118,78 +120,85 @@ class Drive:
         return None
 
     def _follow(self, watch: Watch, until_s: float, stop: Stop, display: Display) -> Ending:
-        next_s = 0.0
+        """Guide the agent, restart what dies and show the progress until the drive must end."""
+        tally = watch.tally
+        observer = tally.observer
+        show_s = 0.0
         shown: Stage | None = None
         missing = watch.missing(self.participants)
         while (ending := self._ending(watch, missing, until_s, stop)) is None:
             watch.pump(PUMP_S)
-            self._guide_agent(watch)
+            if self.guide is not None:
+                for message in self.guide.step(observer, tally.replica.graph):
+                    watch.publish(message)
+
             self.supervisor.check()
             missing = watch.missing(self.participants)
-            self._note_progress(watch, missing)
-            if time.monotonic() >= next_s:
-                next_s = time.monotonic() + SHOW_PERIOD_S
-                _show(watch, missing, display)
-                shown = self._show_stage(shown, display)
+            if not missing:
+                self._note("all ready")
+            if observer.start is not None:
+                self._note("first pose")
+            if tally.cycle_ms:
+                self._note("first command")
+
+            if time.monotonic() < show_s:
+                continue
+            show_s = time.monotonic() + SHOW_PERIOD_S
+            if observer.start is None:
+                display.waiting(missing)
+            else:
+                display.driving(observer, observer.errors())
+            if self.guide is not None and self.guide.stage is not shown:
+                shown = self.guide.stage
+                display.show(self.guide.sentence)
         return ending
 
-    def _guide_agent(self, watch: Watch) -> None:
-        """Publish what the guide wants now, where there is one."""
-        if self.guide is None:
-            return
-
-        tally = watch.tally
-        for message in self.guide.step(tally.observer, tally.replica.graph):
-            watch.publish(message)
-
-    def _show_stage(self, shown: Stage | None, display: Display) -> Stage | None:
-        """Show what the agent does on its tour, once for each stage; the stage that is shown."""
-        guide = self.guide
-        if guide is None or guide.stage is shown:
-            return shown
-
-        display.show(guide.sentence)
-        return guide.stage
-
-    def _note_progress(self, watch: Watch, missing: list[str]) -> None:
-        if not missing:
-            self._note("all ready")
-        if watch.tally.observer.start is not None:
-            self._note("first pose")
-        if watch.tally.cycle_ms:
-            self._note("first command")
+    def _note(self, milestone: str) -> None:
+        """Keep when a milestone was reached for the first time."""
+        elapsed_s = time.monotonic() - self.began_s
+        self.start_s.setdefault(milestone, round(elapsed_s, 3))
 
     def _ending(
         self, watch: Watch, missing: list[str], until_s: float, stop: Stop
     ) -> Ending | None:
         """How the drive must end now; None while it continues."""
-        observer = watch.tally.observer
+        tally = watch.tally
+        observer = tally.observer
         if stop.asked:
             return Ending(Outcome.INTERRUPTED, "interrupted by Ctrl-C")
         if self.guide is not None and self.guide.stage is Stage.COMPLETE:
             return Ending(Outcome.ROUTE_COMPLETE, self.guide.sentence)
         if observer.has_ended:
-            return self._ended(observer)
+            return self._ending_of_simulation(observer)
         if time.monotonic() >= until_s:
-            return _out_of_time(watch, missing)
+            return _out_of_time(tally, missing)
         if observer.start is None:
             return None
-        return self._watchdog.check(_situation(watch, missing))
 
-    def _ended(self, observer: Observer) -> Ending:
+        command = tally.command
+        situation = Situation(
+            now_s=time.monotonic(),
+            drive_s=observer.elapsed_s,
+            place_m=observer.place_m,
+            commands=len(tally.cycle_ms),
+            halted_by=command.halted_by if command else SpeedLimit.NONE,
+            missing=missing,
+            is_charging=tally.energy.is_charging,
+            is_out=tally.energy.is_out,
+        )
+        return self._watchdog.check(situation)
+
+    def _ending_of_simulation(self, observer: Observer) -> Ending:
         """How a drive has ended whose simulation has: at its goals, or as its time is over."""
         sim = self.sections["sim"]
-        has_goals = sim["ends_at_goal"] or self.guide is not None
-        if not has_goals:
+        if not sim["ends_at_goal"] and self.guide is None:
             return Ending(Outcome.ROUTE_COMPLETE, "the time of the drive is over")
-
         if observer.now_s < sim["duration_s"]:
             return Ending(Outcome.ROUTE_COMPLETE, f"the agent was at every goal: {self.goals}")
-
-        came = f"the {sim['duration_s']:g} s of the drive were over"
         return Ending(
             Outcome.TIME_LIMIT,
-            f"{came} at {_reached(observer)}: a higher sim.duration_s allows more",
+            f"the {sim['duration_s']:g} s of the drive were over at {_reached(observer)}: "
+            "a higher sim.duration_s allows more",
         )
 
     @property
@@ -213,41 +222,16 @@ class Drive:
         if not self.choices.without:  # modules of others may still write there
             shutil.rmtree(self.folder / STATE_NAME, ignore_errors=True)
 
-    def _note(self, milestone: str) -> None:
-        elapsed_s = time.monotonic() - self.began_s
-        self.start_s.setdefault(milestone, round(elapsed_s, 3))
 
-
-def _situation(watch: Watch, missing: list[str]) -> Situation:
-    tally = watch.tally
-    return Situation(
-        now_s=time.monotonic(),
-        drive_s=tally.observer.elapsed_s,
-        place_m=tally.observer.place_m,
-        commands=len(tally.cycle_ms),
-        halted_by=tally.command.halted_by if tally.command else SpeedLimit.NONE,
-        missing=missing,
-        is_charging=tally.energy.is_charging,
-        is_out=tally.energy.is_out,
-    )
-
-
-def _show(watch: Watch, missing: list[str], display: Display) -> None:
-    observer = watch.tally.observer
-    if observer.start is None:
-        display.waiting(missing)
-    else:
-        display.driving(observer, observer.errors())
-
-
-def _out_of_time(watch: Watch, missing: list[str]) -> Ending:
+def _out_of_time(tally: Tally, missing: list[str]) -> Ending:
+    """How a drive ends at its time limit: the reason is what it waits for, or the robot's speed."""
     if missing:
         names = ", ".join(missing)
         waited = f"the time limit came while it waited for {names}: see its log"
         return Ending(Outcome.TIME_LIMIT, waited)
 
-    came = f"the time limit came at {_reached(watch.tally.observer)}"
-    share = watch.tally.share_limited_by(SpeedLimit.POSE_AGE)
+    came = f"the time limit came at {_reached(tally.observer)}"
+    share = tally.share_limited_by(SpeedLimit.POSE_AGE)
     if share > MAX_SHARE_SLOWED:
         slow = f"{came}: the robot drove slowly, as {share:.0%} of its poses were old: {REMEDY}"
         return Ending(Outcome.TOO_SLOW, slow)

@@ -25,17 +25,15 @@ class MapFrame:
     def update(self, delta: Delta) -> None:
         """Take account of one delta, before what it has of the agent."""
         for operation in delta.operations:
-            if isinstance(operation, Recollection):
-                pose = (operation.x_m, operation.y_m, operation.heading_rad)
-                self._offered = np.array(pose)
-            elif isinstance(operation, Map) and operation.id == ROOT_MAP:
-                self._on_root(operation)
+            match operation:
+                case Recollection():
+                    pose = (operation.x_m, operation.y_m, operation.heading_rad)
+                    self._offered = np.array(pose)
+                case Map(id=name, remembered=remembered) if name == ROOT_MAP:
+                    if remembered and not self.recalled:
+                        self.recalled = remembered
+                        self._start = self._offered
 
     def from_start(self, points_m: Floats) -> Floats:
         """Points (n, 2) of the map in the frame in which the agent began."""
         return se2.transform_to(self._start, points_m)
-
-    def _on_root(self, root: Map) -> None:
-        if root.remembered and not self.recalled:
-            self.recalled = root.remembered
-            self._start = self._offered

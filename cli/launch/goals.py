@@ -7,8 +7,8 @@ from cogmap.hints import nearest
 from cogmap.schemas.graph import Delta, DropNode
 from cogmap.schemas.nodes import NEVER_NS, PLAN_ID, Goal, Object, Plan, PlanState, goal_id
 
-# A goal is at least so far ahead until it is reached.
-LAST_M = 1.0
+MIN_AHEAD_M = 1.0
+"""The least distance to a goal that is not reached: a share of 1 means that all are."""
 
 
 class GoalProgress:
@@ -52,18 +52,15 @@ class GoalProgress:
         """
         if not self.count:
             return 0.0
-        return (self.reached + self._share_of_way(travelled_m)) / self.count
 
-    def _share_of_way(self, travelled_m: float) -> float:
-        """How much of the way from the last goal to the next is behind the agent."""
         plan = self._plan
         if plan is None or plan.route is None or plan.explores or self.reached == self.count:
-            return 0.0
+            return self.reached / self.count
 
         behind_m = travelled_m - self._since_m
         since_plan_m = travelled_m - self._planned_at_m
-        ahead_m = max(LAST_M, plan.length_m - since_plan_m)
-        return behind_m / (behind_m + ahead_m)
+        ahead_m = max(MIN_AHEAD_M, plan.length_m - since_plan_m)
+        return (self.reached + behind_m / (behind_m + ahead_m)) / self.count
 
 
 def name_of(goal: str) -> str:

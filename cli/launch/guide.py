@@ -69,22 +69,21 @@ class Guide:
         if observer.start is None:
             return []
 
+        plan = graph.get(Plan, PLAN_ID)
         match self.stage:
             case Stage.EXPLORES:
-                has_explored = self._has_explored(observer.elapsed_s, graph)
-                return self._offer(graph) if has_explored else []
+                is_over = observer.elapsed_s >= self._explore_s and graph.agent is not None
+                has_explored_all = (
+                    observer.elapsed_s < self._explore_s
+                    and plan is not None
+                    and plan.planned_ns > 0
+                    and plan.state is PlanState.NO_GOAL
+                )
+                if is_over or has_explored_all:
+                    return self._offer(graph)
             case Stage.DRIVES | Stage.DETOURS:
-                return self._follow(observer, graph)
-            case Stage.COMPLETE:
-                return []
-
-    def _has_explored(self, elapsed_s: float, graph: Graph) -> bool:
-        """Whether the time is over, or the plan states that nothing is left to explore."""
-        if elapsed_s >= self._explore_s:
-            return graph.agent is not None
-
-        plan = graph.get(Plan, PLAN_ID)
-        return plan is not None and plan.planned_ns > 0 and plan.state is PlanState.NO_GOAL
+                return self._follow(plan, observer, graph)
+        return []
 
     def _offer(self, graph: Graph) -> list[Message]:
         goals = self._given or _far_apart(graph)
@@ -95,8 +94,10 @@ class Guide:
         self._goals = [goal.id for goal in goals]
         return [Offer(cycle=graph.cycle, operations=[*goals])]
 
-    def _follow(self, observer: Observer, graph: Graph) -> list[Message]:
-        """Close a street once only the last goal is left; end where all are reached."""
+    def _follow(self, plan: Plan | None, observer: Observer, graph: Graph) -> list[Message]:
+        """Complete the tour when all goals are reached. Once only the last is left, close a street
+        that the route to it passes ahead, and that can be driven round.
+        """
         goals = [graph.get(Goal, name) for name in self._goals]
         known = [goal for goal in goals if goal is not None]
         left = [goal for goal in known if goal.reached_ns == NEVER_NS]
@@ -104,14 +105,9 @@ class Guide:
             self.stage = Stage.COMPLETE
             return []
 
-        plan = graph.get(Plan, PLAN_ID)
         is_last = len(left) == 1 and plan is not None and plan.goals == [left[0].id]
         if not is_last or self.stage is Stage.DETOURS:
             return []
-        return self._close(plan, observer)
-
-    def _close(self, plan: Plan | None, observer: Observer) -> list[Message]:
-        """Close a street that the plan's route passes ahead, and that can be driven round."""
         if plan is None or plan.route is None or observer.town is None:
             return []
 

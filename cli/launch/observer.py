@@ -27,8 +27,8 @@ OBSERVED = (
     topics.DELTA,
 )
 MOTION_COLUMNS = 5
-# Farther from where it was before, the robot is in another street.
 STREET_M = 8.0
+"""Farther from all of its path so far, the robot is in a street new to it."""
 
 
 @dataclass(frozen=True)
@@ -94,8 +94,11 @@ class Observer:
         match message:
             case TruePose():
                 self._on_pose(message)
-            case Odometry():
-                self._on_odometry(message)
+            case Odometry() if not self._wheels.reached(message.stamp_ns):
+                dt_ns = round(message.dt_s * 1e9)
+                self._wheels.start(message.stamp_ns - dt_ns)
+                self._wheels.move(message.speed_m_s, message.turn_rate_rad_s, message.dt_s)
+                self._wheels.mark(message.stamp_ns)
             case SelfMotion():
                 self._on_self_motion(message)
             case Delta():
@@ -104,33 +107,22 @@ class Observer:
                 self.town = message
 
     def _on_pose(self, true: TruePose) -> None:
+        pose = true.pose
         if self.start is None:
-            self.start = true.pose
+            self.start = pose
             self._began_ns = true.stamp_ns
 
-        pose = true.pose
         self.place_m = (pose.x_m, pose.y_m)
         self._true.add(true.stamp_ns, pose.x_m, pose.y_m)
-
         self._now_ns = max(self._now_ns, true.stamp_ns)
         self.travelled_m = true.travelled_m
         self.has_ended = true.progress >= 1.0
         self._share_of_time = true.progress
 
-    def _on_odometry(self, odometry: Odometry) -> None:
-        if self._wheels.reached(odometry.stamp_ns):
-            return
-
-        dt_ns = round(odometry.dt_s * 1e9)
-        self._wheels.start(odometry.stamp_ns - dt_ns)
-        self._wheels.move(odometry.speed_m_s, odometry.turn_rate_rad_s, odometry.dt_s)
-        self._wheels.mark(odometry.stamp_ns)
-
     def _on_self_motion(self, motion: SelfMotion) -> None:
         motions = motion.motions.numpy()
         if motions.ndim != 2 or motions.shape[1] != MOTION_COLUMNS:
             raise MessageError(f"self-motion of shape {motions.shape}: it needs (n, 5)")
-
         if self._fused.reached(motion.stamp_ns):
             return
 
@@ -232,30 +224,32 @@ class Observer:
     @property
     def estimated_path_m(self) -> Floats:
         """(n, 2): the self node's positions."""
-        points_m = self._estimate.points_m
-        return self._from_start(points_m)
+        return self._from_start(self._estimate.points_m)
 
     @property
     def wheels_path_m(self) -> Floats:
         """(n, 2): the wheels' odometry integrated, nothing else."""
-        points_m = self._wheels.track.points_m
-        return self._from_start(points_m)
+        return self._from_start(self._wheels.track.points_m)
 
     @property
     def fused_path_m(self) -> Floats:
         """(n, 2): the fused self-motion (`sensory/motion`) integrated, nothing else."""
-        points_m = self._fused.track.points_m
-        return self._from_start(points_m)
+        return self._from_start(self._fused.track.points_m)
 
     def errors(self) -> Errors:
         """The errors at the stamp of every estimate that truth, wheels and fused self-motion all
         cover; none of the wheels where these publish nothing, as at the level of percepts.
         """
-        stamps_ns = self._compared_ns()
+        others = [self._true, self._fused.track]
+        if len(self._wheels.track):
+            others.append(self._wheels.track)
+        stamps_ns = self._estimate.stamps_ns
+        for track in others:
+            stamps_ns = stamps_ns[track.covers(stamps_ns)]
+
         if not stamps_ns.size:
             nothing = np.zeros(0)
             return Errors(stamps_ns, nothing, nothing, nothing)
-
         return Errors(
             stamps_ns,
             estimate_m=self._distances_m(self._estimate, stamps_ns),
@@ -263,27 +257,13 @@ class Observer:
             fused_m=self._distances_m(self._fused.track, stamps_ns),
         )
 
-    def _compared_ns(self) -> Indices:
-        """The stamps of the estimates that every other track covers, (n,)."""
-        stamps_ns = self._estimate.stamps_ns
-        tracks = [self._true, self._fused.track]
-        if len(self._wheels.track):
-            tracks.append(self._wheels.track)
-        for track in tracks:
-            is_covered = track.covers(stamps_ns)
-            stamps_ns = stamps_ns[is_covered]
-        return stamps_ns
-
     def _distances_m(self, track: Track, stamps_ns: Indices) -> Floats:
-        """How far the positions of `track` at (n,) stamps are from the true ones, (n,); (0,) where
-        it has none.
+        """How far the positions of `track` at (n,) stamps are from the true ones, (n,); (0,) if it
+        has none.
         """
         if not len(track):
             return np.zeros(0)
 
-        true_m = self._true.at(stamps_ns)
-        believed_m = self._from_start(track.at(stamps_ns))
-
-        x_m, y_m = (believed_m - true_m).T
-        distances_m: Floats = np.hypot(x_m, y_m)
+        off_m = self._from_start(track.at(stamps_ns)) - self._true.at(stamps_ns)
+        distances_m: Floats = np.hypot(*off_m.T)
         return distances_m

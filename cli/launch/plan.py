@@ -1,4 +1,4 @@
-"""What a run consists of: the configuration of every module, and the processes to start."""
+"""Plans a run: the configuration of every module, and the processes to start."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import tomli_w
 
 from cogmap.cli.files import LOG_NAME
 from cogmap.cli.launch.command_line import cogmap_command
+from cogmap.cli.launch.goals import name_of
 from cogmap.cli.launch.supervisor import Program
 from cogmap.errors import ConfigError
 from cogmap.runtime import config
@@ -37,10 +38,10 @@ TOUR_LIMIT_S = 600.0
 EXPLORE_S = 150.0
 HOME = Goal(id=goal_id("home"))
 HOME_AFTER = 1.5
-"""An agent may take so many times as long to its goals as it explored."""
+"""How many times as long as it explored an agent may take to its goals."""
 LAP_S = 300.0
 LAP_UNKNOWN_COST = 2.0
-"""A lap leads along streets that are not known yet, where those that are known lead there too."""
+"""A lap leads along unknown streets too, though known ones may lead to the same corner."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +78,16 @@ def effective(base: Sections, choices: Choices, observer: bool) -> Sections:
     config.check_sections(base, registry.sections())
     if choices.laps is not None and not _has_laps(base, choices):
         raise ConfigError(
-            "--laps is of the loop town, and of a drive without goals of its own: leave it out"
+            "--laps is for the loop town, and a drive without goals of its own: leave it out"
         )
 
     chosen = _chosen(base, choices, observer)
-    return {name: _complete(chosen, name) for name in registry.sections()}
+    complete: Sections = {}
+    for name in chosen:
+        typed = config.typed(chosen, name, registry.config_type(name))
+        values: dict[str, Any] = msgspec.to_builtins(typed)
+        complete[name] = {key: value for key, value in values.items() if value is not None}
+    return complete
 
 
 def _has_laps(base: Sections, choices: Choices) -> bool:
@@ -99,15 +105,19 @@ def _chosen(base: Sections, choices: Choices, observer: bool) -> Sections:
     sections = {name: dict(base.get(name, {})) for name in registry.sections()}
     sections["run"].setdefault("lockstep", is_stepped)
     sections["run"].setdefault("participants", participants(choices, observer))
+    if choices.energy:
+        sections["run"]["energy"] = True
+
     sim = sections["sim"]
     if choices.seed is not None:
         sim["seed"] = choices.seed
     if choices.town is not None:
         sim["town"] = choices.town
-    if choices.energy:
-        sections["run"]["energy"] = True
     if choices.tour:
-        _set_out(sim)
+        sim.setdefault("town", BLOCKS)
+        sim.setdefault("sensing", "percepts")  # so that its minutes take seconds
+        sim.setdefault("town_size_m", TOUR_TOWN_M)
+        sim.setdefault("duration_s", TOUR_LIMIT_S)
     if sim.get("sensing") == "percepts":
         sim.setdefault("noise", msgspec.to_builtins(FUSED))
     if "trajectory" not in sim:
@@ -118,7 +128,7 @@ def _chosen(base: Sections, choices: Choices, observer: bool) -> Sections:
 
 
 def _give_goals(sections: Sections, choices: Choices) -> None:
-    """The agent's goals, where there are any; the drive ends when they are reached.
+    """Give the agent its goals, if there are any; the drive ends when they are reached.
 
     These are the goals that are chosen, after exploring else home; else those that are set, else
     the corners of the loop.
@@ -132,53 +142,23 @@ def _give_goals(sections: Sections, choices: Choices) -> None:
         sim.setdefault("duration_s", (1 + HOME_AFTER) * choices.explore_s)
 
     if goals:
-        workspace["goals"] = [_given(goal) for goal in goals]
+        workspace["goals"] = [
+            {"name": name_of(goal.id), "object": goal.object, "x_m": goal.x_m, "y_m": goal.y_m}
+            for goal in goals
+        ]
     elif "goals" not in workspace and sim.get("town", LOOP) == LOOP:
         laps = choices.laps or 1.0
-        workspace["goals"] = _of_laps(sim.get("seed", SimConfig().seed), laps)
+        *corners, end = generate(sim.get("seed", SimConfig().seed)).goals(laps)
+        places = [(f"corner {number}", place) for number, place in enumerate(corners, start=1)]
+        workspace["goals"] = [
+            {"name": name, "x_m": x_m, "y_m": y_m} for name, (x_m, y_m) in [*places, ("end", end)]
+        ]
         workspace["in_order"] = True
         sections["planning"].setdefault("unknown_cost", LAP_UNKNOWN_COST)
         sim.setdefault("duration_s", max(SimConfig().duration_s, LAP_S * laps))
 
     if workspace.get("goals"):
         sim.setdefault("ends_at_goal", True)
-
-
-def _given(goal: Goal) -> dict[str, Any]:
-    """A goal as the workspace is configured with it."""
-    name = goal.id.removeprefix(goal_id(""))
-    return {"name": name, "object": goal.object, "x_m": goal.x_m, "y_m": goal.y_m}
-
-
-def _of_laps(seed: int, laps: float) -> list[dict[str, Any]]:
-    """The corners of the loop that so many laps lead past, and where they end."""
-    *corners, end = generate(seed).goals(laps)
-    places = [(f"corner {number}", place) for number, place in enumerate(corners, start=1)]
-    places.append(("end", end))
-    return [{"name": name, "x_m": x_m, "y_m": y_m} for name, (x_m, y_m) in places]
-
-
-def _set_out(sim: dict[str, Any]) -> None:
-    """The town and the time of a tour, as far as they are not set.
-
-    It is sensed at the level of percepts, so that its minutes take seconds.
-    """
-    sim.setdefault("town", BLOCKS)
-    sim.setdefault("sensing", "percepts")
-    sim.setdefault("town_size_m", TOUR_TOWN_M)
-    sim.setdefault("duration_s", TOUR_LIMIT_S)
-
-
-def _complete(sections: Sections, name: str) -> dict[str, Any]:
-    """The section of a module with every key that has a value."""
-    kind = registry.config_type(name)
-    typed = config.typed(sections, name, kind)
-
-    complete: dict[str, Any] = {}
-    for key, value in msgspec.to_builtins(typed).items():
-        if value is not None:
-            complete[key] = value
-    return complete
 
 
 def participants(choices: Choices, observer: bool) -> dict[str, int]:
@@ -199,66 +179,40 @@ def to_toml(sections: Sections) -> str:
 
 
 def programs(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[Program]:
-    """All processes of a run, in the order in which they are to be started: early what the others
-    wait for, the simulation too, whose world takes long to build.
+    """All processes of a run but those that somebody else starts, in the order in which they are to
+    be started: early what the others wait for, the simulation too, whose world takes long to build.
+
+    Modules are held until what records them is there.
     """
-    started = _infrastructure(folder, endpoint, agent, choices)
-    started += _modules(folder, endpoint, agent, choices)
-    return sorted(started, key=_start_order)
-
-
-def _start_order(program: Program) -> int:
-    instance = program.instance
-    return START_FIRST.index(instance) if instance in START_FIRST else len(START_FIRST)
-
-
-def _infrastructure(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[Program]:
-    """What carries and what records the messages."""
-    programs = []
+    found = []
     if choices.own_router:
         router = cogmap_command("router", "--tied", "--connect", endpoint)
-        programs.append(Program(ROUTER, lambda starts: router))
+        found.append(Program.of(ROUTER, router))
+
+    config_path = str(folder / CONFIG_NAME)
+    options = ["--tied", "--connect", endpoint, "--agent", agent, "--config", config_path]
 
     def record(starts: int) -> list[str]:
         """A recorder that died leaves its log as it is, and the next one writes another."""
         name = LOG_NAME if starts == 0 else f"log-{starts + 1}.mcap"
-        log = folder / name
-        options = _options(folder, endpoint, agent)
-        return cogmap_command("log", "record", *options, "-o", str(log))
+        return cogmap_command("log", "record", *options, "-o", str(folder / name))
 
     if choices.record:
-        programs.append(Program(RECORDER, record))
-    return programs
+        found.append(Program(RECORDER, record))
 
-
-def _modules(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[Program]:
-    """Every module but those that somebody else starts, in the order of the table; they are held
-    until what records them is there.
-    """
-    options = [*_options(folder, endpoint, agent), "--state", str(folder / STATE_NAME)]
-    options += ["--memory", str(choices.memory or folder / MEMORY_NAME)]
-    programs = []
+    memory = str(choices.memory or folder / MEMORY_NAME)
+    kept = ["--state", str(folder / STATE_NAME), "--memory", memory]
     for name in registry.MODULES:
         if name in choices.without:
             continue
-        for instance in _instances(name, choices):
-            program = _module(name, instance, options)
-            programs.append(program)
-    return programs
+        instances = [name]
+        if name == REPLICATED:
+            instances = [f"{name}-{number}" for number in range(1, choices.codelets + 1)]
+        for instance in instances:
+            command = cogmap_command(
+                "module", name, "--instance", instance, "--held", *options, *kept
+            )
+            found.append(Program.of(instance, command, is_held=True))
 
-
-def _options(folder: Path, endpoint: str, agent: str) -> list[str]:
-    config_path = folder / CONFIG_NAME
-    where = ["--tied", "--connect", endpoint, "--agent", agent]
-    return [*where, "--config", str(config_path)]
-
-
-def _instances(name: str, choices: Choices) -> list[str]:
-    if name != REPLICATED:
-        return [name]
-    return [f"{name}-{number}" for number in range(1, choices.codelets + 1)]
-
-
-def _module(name: str, instance: str, options: Sequence[str]) -> Program:
-    command = cogmap_command("module", name, "--instance", instance, "--held", *options)
-    return Program(instance, lambda starts: command, is_held=True)
+    first = [program for name in START_FIRST for program in found if program.instance == name]
+    return [*first, *(program for program in found if program not in first)]

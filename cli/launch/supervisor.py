@@ -21,7 +21,7 @@ MAX_BACKOFF_S = 5.0
 STEADY_S = 10.0
 MAX_QUICK_DEATHS = 4
 USAGE_EXIT = 2
-KILLED_S = 10.0
+KILL_TIMEOUT_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,11 @@ class Program:
     instance: str
     command: Callable[[int], Sequence[str]]
     is_held: bool = False
+
+    @classmethod
+    def of(cls, instance: str, command: Sequence[str], is_held: bool = False) -> Program:
+        """A program that is started by the same command line each time."""
+        return cls(instance, lambda starts: command, is_held)
 
 
 class Process(Protocol):
@@ -73,9 +78,25 @@ class Child:
         self.start()
 
     def start(self) -> None:
-        """Start it, in a session of its own so that a Ctrl-C here does not reach it."""
+        """Start it, in a session of its own so that a Ctrl-C here does not reach it.
+
+        It is forked, if there is a server for that and it is a process of `cogmap`.
+        """
+        command = self.program.command(self.starts)
+        arguments = arguments_of(command)
         with self._log.open("ab") as log:
-            self._process = self._launched(self.program.command(self.starts), log)
+            if arguments is not None and self._server is not None and self._server.is_alive:
+                self._process: Process = self._server.fork(arguments, log.fileno())
+            else:
+                self._process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.PIPE,
+                    stdout=log,
+                    stderr=subprocess.STDOUT,
+                    env=environment(),
+                    start_new_session=True,
+                )
+
         self.starts += 1
         self._started_s = time.monotonic()
         self._due_s = None
@@ -94,21 +115,6 @@ class Child:
         with suppress(BrokenPipeError):  # it has died, which is noticed when it is checked
             os.write(pipe.fileno(), b"\n")
 
-    def _launched(self, command: Sequence[str], log: IO[bytes]) -> Process:
-        """Forked, where there is a server for that and it has what the command needs."""
-        arguments = arguments_of(command)
-        if arguments is not None and self._server is not None and self._server.is_alive:
-            return self._server.fork(arguments, log.fileno())
-
-        return subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=log,
-            stderr=subprocess.STDOUT,
-            env=environment(),
-            start_new_session=True,
-        )
-
     @property
     def pid(self) -> int:
         """The process id."""
@@ -124,18 +130,22 @@ class Child:
         if code is None:
             return False
         if self._due_s is None:
-            self._on_death(code)
-        if self._due_s is None or time.monotonic() < self._due_s:
+            self._due_s = self._restart_time_s(code)
+        if time.monotonic() < self._due_s:
             return False
 
         self._close_pipe()
         self.start()
         return True
 
-    def _on_death(self, code: int) -> None:
+    def _restart_time_s(self, code: int) -> float:
+        """When to start it again after it ended with `code`, on the monotonic clock."""
         instance = self.program.instance
+        lines = self._log.read_text(errors="replace").splitlines()
+        written = [line for line in lines if line.strip()]
+        last_words = written[-1].removeprefix("cogmap: ") if written else "none"
         if code == USAGE_EXIT:
-            raise ProcessFailedError(f"{instance} has ended: {self._last_words()}")
+            raise ProcessFailedError(f"{instance} has ended: {last_words}")
 
         now_s = time.monotonic()
         if now_s - self._started_s > STEADY_S:
@@ -146,19 +156,12 @@ class Child:
         if self._quick_deaths >= MAX_QUICK_DEATHS:
             raise ProcessFailedError(
                 f"{instance} died {self._quick_deaths} times soon after its start, "
-                f"the last words in {self._log} are: {self._last_words()}"
+                f"the last words in {self._log} are: {last_words}"
             )
 
-        self._due_s = now_s + self._backoff_s
-        self._backoff_s = min(MAX_BACKOFF_S, 2 * self._backoff_s)
-
-    def _last_words(self) -> str:
-        """The last line of its log."""
-        lines = self._log.read_text(errors="replace").splitlines()
-        for line in reversed(lines):
-            if line.strip():
-                return line.removeprefix("cogmap: ")
-        return "none"
+        backoff_s = self._backoff_s
+        self._backoff_s = min(MAX_BACKOFF_S, 2 * backoff_s)
+        return now_s + backoff_s
 
     def ask_to_end(self) -> None:
         """Send SIGTERM."""
@@ -172,7 +175,7 @@ class Child:
             by_itself = True
         except subprocess.TimeoutExpired:
             self._process.kill()
-            self._process.wait(KILLED_S)
+            self._process.wait(KILL_TIMEOUT_S)
             by_itself = False
 
         self._close_pipe()

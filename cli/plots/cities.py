@@ -7,25 +7,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from cogmap.cli.plots.draw import STYLE
 from cogmap.cli.plots.palette import (
     ESTIMATE,
     FAINT,
     INK,
     KERB,
     OBJECT,
-    PAPER,
     SEVERAL,
     STREET,
     TRUE,
     WHEELS,
 )
+from cogmap.cli.plots.sheet import describe, new_sheet, remove_scales
 from cogmap.experiments.city_maps import published
 from cogmap.experiments.city_maps.drive import SENSING
 from cogmap.experiments.city_maps.measure import CityMap
@@ -45,51 +43,34 @@ SCALE_M = 200.0
 
 
 def figure(maps: Sequence[CityMap], metrics: dict[str, Any]) -> Figure:
-    """The sheet: errors on top, below true and learned maps, a column each, of at most MAX_SHEETS
-    of them.
+    """The sheet: errors on top; below, true and learned maps, a column each, of at most MAX_SHEETS
+    of them, from the shortest tour to the longest.
     """
-    chosen = _spread(maps)
+    ordered = sorted(maps, key=lambda each: each.environment.tour_m)
+    picks = np.linspace(0, len(ordered) - 1, min(MAX_SHEETS, len(ordered))).round().astype(int)
+    chosen = [ordered[pick] for pick in np.unique(picks).tolist()]
     columns = max(2, len(chosen))
-    with mpl.rc_context(STYLE):
-        sheet = Figure(
-            figsize=(max(11.0, 2.9 * columns), 12.5), dpi=110, facecolor=PAPER, layout="constrained"
-        )
-        above = sheet.add_gridspec(2, 1, height_ratios=(1, 2.1))
-        top, below = (sheet.add_subfigure(above[row]) for row in (0, 1))
-        top.set_facecolor(PAPER)
-        below.set_facecolor(PAPER)
-        errors, sizes = top.subplots(1, 2, width_ratios=(2.2, 1))
-        _draw_errors(errors, maps)
-        _draw_growth(sizes, maps, metrics)
-        panels = below.subplots(3, columns, squeeze=False)
-        for column, each in enumerate(chosen):
-            _draw_maps(panels[:, column].tolist(), each)
-        for panel in panels[:, len(chosen) :].ravel():
-            panel.axis("off")
-        sheet.suptitle(
-            _title(maps, metrics), x=0.01, ha="left", color=INK, fontsize=12, fontweight="bold"
-        )
-        sheet.draw_without_rendering()
-    return sheet
 
-
-def _title(maps: Sequence[CityMap], metrics: dict[str, Any]) -> str:
-    times = "once" if len(maps[0].learned) == 1 else f"{len(maps[0].learned)} times"
-    return (
-        f"Learned maps of {len(maps)} environments, traversed {times} each, {SENSING}.\n"
+    traversals = len(maps[0].learned)
+    title = (
+        f"Learned maps of {len(maps)} environments, traversed "
+        f"{'once' if traversals == 1 else f'{traversals} times'} each, {SENSING}.\n"
         "Corrected over uncorrected error: "
         f"{metrics['error_corrected_over_uncorrected']:.2f} with headings, "
         f"{metrics['error_positions_over_uncorrected']:.2f} positions only"
     )
+    with new_sheet(max(11.0, 2.9 * columns), 12.5, title) as sheet:
+        grid = sheet.add_gridspec(2, 1, height_ratios=(1, 2.1))
+        errors, sizes = sheet.add_subfigure(grid[0]).subplots(1, 2, width_ratios=(2.2, 1))
+        _draw_errors(errors, maps)
+        _draw_growth(sizes, maps, metrics)
 
-
-def _spread(maps: Sequence[CityMap]) -> list[CityMap]:
-    """MAX_SHEETS of the maps, from the shortest tour to the longest."""
-    ordered = sorted(maps, key=lambda each: each.environment.tour_m)
-    picks = np.unique(
-        np.linspace(0, len(ordered) - 1, min(MAX_SHEETS, len(ordered))).round().astype(int)
-    )
-    return [ordered[pick] for pick in picks.tolist()]
+        panels = sheet.add_subfigure(grid[1]).subplots(3, columns, squeeze=False)
+        for column, each in enumerate(chosen):
+            _draw_maps(panels[:, column].tolist(), each)
+        for panel in panels[:, len(chosen) :].ravel():
+            panel.axis("off")
+    return sheet
 
 
 def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
@@ -125,10 +106,8 @@ def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
     axes.set_xticks(places, [_name(each) for each in maps], rotation=40, ha="right", fontsize=7.5)
     axes.set_ylim(0, axes.get_ylim()[1] * 1.45)
     axes.legend(frameon=False, fontsize=7.5, ncols=2, loc="upper left")
-    axes.set_title(
-        "a   error of each map: sum of squared errors of its 8 buildings", loc="left", fontsize=10
-    )
-    _label(axes, "", "km²")
+    title = "a   error of each map: sum of squared errors of its 8 buildings"
+    describe(axes, title, y="km²")
 
 
 def _draw_growth(axes: Axes, maps: Sequence[CityMap], metrics: dict[str, Any]) -> None:
@@ -146,8 +125,7 @@ def _draw_growth(axes: Axes, maps: Sequence[CityMap], metrics: dict[str, Any]) -
         )
     axes.set_ylim(bottom=0)
     axes.legend(frameon=False, fontsize=8, title="km² for a km of tour", title_fontsize=8)
-    axes.set_title("b   growth with map size", loc="left", fontsize=10)
-    _label(axes, "tour, km", "km²")
+    describe(axes, "b   growth with map size", "tour, km", "km²")
 
 
 def _draw_maps(column: Sequence[Axes], each: CityMap) -> None:
@@ -179,9 +157,7 @@ def _draw_maps(column: Sequence[Axes], each: CityMap) -> None:
         axes.set_xlim(ends[:, 0].min() - MARGIN_M, ends[:, 0].max() + MARGIN_M)
         axes.set_ylim(ends[:, 1].min() - MARGIN_M, ends[:, 1].max() + MARGIN_M)
         axes.set_aspect("equal", adjustable="box")
-        axes.set_xticks([])
-        axes.set_yticks([])
-        axes.set_facecolor(PAPER)
+        remove_scales(axes)
     left, bottom = ends.min(axis=0) - 0.6 * MARGIN_M
     column[0].plot([left, left + SCALE_M], [bottom, bottom], color=INK, lw=2)
     column[0].text(
@@ -200,10 +176,3 @@ def _streets(axes: Axes, each: CityMap) -> None:
 
 def _name(each: CityMap) -> str:
     return each.environment.name.replace("_", " ")
-
-
-def _label(axes: Axes, x: str, y: str) -> None:
-    axes.set_xlabel(x, color=FAINT)
-    axes.set_ylabel(y, color=FAINT)
-    axes.tick_params(colors=FAINT, length=3)
-    axes.set_facecolor(PAPER)

@@ -4,14 +4,13 @@ condition.
 
 from __future__ import annotations
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from cogmap.cli.plots.draw import STYLE
-from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, SEVERAL, TRUE
+from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, SEVERAL, TRUE
+from cogmap.cli.plots.sheet import describe, new_sheet
 from cogmap.experiments.cue_integration import published
 from cogmap.experiments.cue_integration.analysis import rmse_m
 from cogmap.experiments.cue_integration.geometry import LANDMARKS, POSTS, ROUTES, START, Points
@@ -31,39 +30,28 @@ OPTIMAL = TRUE
 
 
 def figure(found: Outcome) -> Figure:
-    """The sheet."""
-    with mpl.rc_context(STYLE):
-        sheet = Figure(figsize=(13, 7.6), dpi=130, facecolor=PAPER, layout="constrained")
+    """The sheet: the room, the responses, and their SD and RMSE by condition."""
+    noise = found.noise
+    title = (
+        f"Cue integration in Nardini's room, {len(found.errors_m[Condition.BOTH])} trials a "
+        f"condition\nsimulated senses err by {noise.distance:.0%} of distance, "
+        f"{noise.speed:.0%} of speed and {noise.turn:.0%} of turn rate"
+    )
+    with new_sheet(13, 7.6, title, dpi=130) as sheet:
         panels = sheet.subplot_mosaic([["room", "responses", "responses"], ["room", "sd", "rmse"]])
         _draw_room(panels["room"])
         _draw_responses(panels["responses"], found)
-        theirs = {"sd": published.SD_M, "rmse": published.RMSE_M}
-        ours = {
-            name: {c: f(found.errors_m[c]) for c in Condition} for name, f in (("rmse", rmse_m),)
-        }
-        ours["sd"] = {condition: found.sd_m(condition) for condition in Condition}
-        for name, title in (
-            ("sd", "c   SD of the responses"),
-            ("rmse", "d   RMSE of the responses"),
-        ):
-            _draw_bars(panels[name], ours[name], theirs[name], title)
+
+        sds_m = {condition: found.sd_m(condition) for condition in Condition}
+        _draw_bars(panels["sd"], sds_m, published.SD_M, "c   SD of the responses")
         panels["sd"].hlines(
             found.optimal_sd_m, 1.6, 2.0, color=OPTIMAL, lw=2, label="optimal combination of ours"
         )
         panels["sd"].legend(frameon=False, fontsize=8, loc="upper right")
-        sheet.suptitle(_title(found), x=0.01, ha="left", color=INK, fontsize=12, fontweight="bold")
-        sheet.draw_without_rendering()
+
+        rmses_m = {condition: rmse_m(found.errors_m[condition]) for condition in Condition}
+        _draw_bars(panels["rmse"], rmses_m, published.RMSE_M, "d   RMSE of the responses")
     return sheet
-
-
-def _title(found: Outcome) -> str:
-    noise = found.noise
-    number = len(found.errors_m[Condition.BOTH])
-    self_motion = f"{noise.speed:.0%} of speed and {noise.turn:.0%} of turn rate"
-    return (
-        f"Cue integration in Nardini's room, {number} trials a condition\n"
-        f"simulated senses err by {noise.distance:.0%} of distance, {self_motion}"
-    )
 
 
 def _draw_room(axes: Axes) -> None:
@@ -83,8 +71,7 @@ def _draw_room(axes: Axes) -> None:
     axes.plot(*START, "s", ms=8, mfc="white", mec=TRUE)
     axes.annotate("start", START, (8, -3), textcoords="offset points", color=INK)
     axes.set_aspect("equal")
-    axes.set_title("a   room, landmarks (stars), posts, a way", loc="left", color=INK, fontsize=10)
-    _label(axes, "x, metres", "y, metres")
+    describe(axes, "a   room, landmarks (stars), posts, a route", "x, metres", "y, metres")
 
 
 def _draw_responses(axes: Axes, found: Outcome) -> None:
@@ -99,10 +86,8 @@ def _draw_responses(axes: Axes, found: Outcome) -> None:
         axes.annotate(name, (x_m, 0), (4, -14), textcoords="offset points", fontsize=8, color=INK)
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(frameon=False, fontsize=8, loc="upper right")
-    axes.set_title("b   responses, and their SD about the mean", loc="left", color=INK, fontsize=10)
-    _label(
-        axes, "metres along the way that turned landmarks move the target", "metres towards post 8"
-    )
+    x = "metres in the direction in which turned landmarks move the target"
+    describe(axes, "b   responses, and their SD about the mean", x, "metres towards post 8")
 
 
 def _one_sd(errors_m: Points, colour: str) -> Ellipse:
@@ -134,13 +119,5 @@ def _draw_bars(
         axes.bar_label(bars, fmt="%.2f", fontsize=7.5, color=INK, padding=5)
     axes.set_xticks(places, [NAMES[condition] for condition in Condition])
     axes.set_ylim(0, 1.35 * max(*ours.values(), *theirs.values()))
-    axes.set_title(title, loc="left", color=INK, fontsize=10)
     axes.legend(frameon=False, fontsize=8)
-    _label(axes, "", "metres")
-
-
-def _label(axes: Axes, x: str, y: str) -> None:
-    axes.set_xlabel(x, color=FAINT)
-    axes.set_ylabel(y, color=FAINT)
-    axes.tick_params(colors=FAINT, length=3)
-    axes.set_facecolor(PAPER)
+    describe(axes, title, y="metres")

@@ -6,24 +6,21 @@ from __future__ import annotations
 
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
-from cogmap.cli.plots.draw import STYLE
 from cogmap.cli.plots.palette import (
     ESTIMATE,
     FAINT,
-    INK,
     OBJECT,
-    PAPER,
     ROAD,
     SEVERAL,
     TRUE,
     WHEELS,
 )
+from cogmap.cli.plots.sheet import describe, new_sheet
 from cogmap.experiments.loop_closing.observer import Loop, Map, Replayed
 from cogmap.experiments.loop_closing.run import SENSING
 
@@ -34,36 +31,22 @@ def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
     """
     positions = loops["positions"]
     heading = loops["heading"]
-    with mpl.rc_context(STYLE):
-        sheet = Figure(figsize=(14.0, 9.0), dpi=110, facecolor=PAPER, layout="constrained")
+    title = f"A loop of {len(positions.before.path_m)} places, {SENSING}, wheels as the town's"
+    with new_sheet(14.0, 9.0, title) as sheet:
         parts: Any = sheet.subfigures(2, 1, height_ratios=(1.5, 1))
-        maps, below = parts
-        for part in (maps, below):
-            part.set_facecolor(PAPER)
-        panels = maps.subplots(1, 3, sharex=True, sharey=True)
-        _draw_map(panels[0], positions.before, WHEELS, "a   before")
-        _draw_map(
-            panels[1],
-            positions.after,
-            SEVERAL[1],
-            "b   after the first replay, positions only (eq. 9)",
-        )
-        _draw_map(panels[2], heading.end, ESTIMATE, "c   in the end, headings corrected too")
-        _draw_shifts(panels[1], positions.before, positions.after)
-        maps.legend(
-            *panels[0].get_legend_handles_labels(), frameon=False, ncols=4, loc="outside upper left"
-        )
+        above, below = parts
+        before, after, end = above.subplots(1, 3, sharex=True, sharey=True)
+        _draw_map(before, positions.before, WHEELS, "a   before")
+        replayed = "b   after the first replay, positions only (eq. 9)"
+        _draw_map(after, positions.after, SEVERAL[1], replayed)
+        _draw_shifts(after, positions.before, positions.after)
+        _draw_map(end, heading.end, ESTIMATE, "c   in the end, headings corrected too")
+        handles, labels = before.get_legend_handles_labels()
+        above.legend(handles, labels, frameon=False, ncols=4, loc="outside upper left")
+
         shifts, synapses = below.subplots(1, 2)
         _draw_replay(shifts, positions.replays[0])
         _draw_synapses(synapses, positions.replays[0], metrics)
-        sheet.suptitle(
-            f"A loop of {len(positions.before.path_m)} places, {SENSING}, wheels as the town's",
-            x=0.01,
-            ha="left",
-            color=INK,
-            fontsize=12,
-        )
-        sheet.draw_without_rendering()
     return sheet
 
 
@@ -78,7 +61,7 @@ def _draw_map(axes: Axes, drawn: Map, colour: str, title: str) -> None:
         label="where the agent was",
     )
     axes.plot(
-        *drawn.path_m.T, color=colour, lw=1.8, zorder=3, label="where it takes itself to have been"
+        *drawn.path_m.T, color=colour, lw=1.8, zorder=3, label="where it believes that it was"
     )
     lines = np.stack([drawn.true_objects_m, drawn.objects_m], axis=1)
     axes.add_collection(
@@ -91,12 +74,11 @@ def _draw_map(axes: Axes, drawn: Map, colour: str, title: str) -> None:
     axes.plot(*drawn.path_m[0], "o", ms=8, color=ROAD, mec="white", zorder=6)
     axes.plot(*drawn.path_m[-1], "o", ms=8, color=colour, mec="white", zorder=6)
     axes.set_aspect("equal", adjustable="box")
-    axes.set_title(title, loc="left", fontsize=10)
     errors = (
         f"error: path {drawn.path_error_m:.1f} m, buildings {drawn.object_error_m:.1f} m, "
         f"end {drawn.end_error_m:.1f} m"
     )
-    _label(axes, errors, "m")
+    describe(axes, title, errors, "m")
 
 
 def _draw_shifts(axes: Axes, before: Map, after: Map) -> None:
@@ -109,10 +91,8 @@ def _draw_shifts(axes: Axes, before: Map, after: Map) -> None:
 def _draw_replay(axes: Axes, replay: Replayed) -> None:
     axes.plot(np.arange(len(replay.shifts_m)), replay.shifts_m, color=SEVERAL[1], lw=1.8)
     axes.set_ylim(bottom=0)
-    axes.set_title(
-        "d   how far each place field shifts, in the order of the replay", loc="left", fontsize=10
-    )
-    _label(axes, "places, from the one met again backwards", "m")
+    title = "d   shift of each place field, in the order of the replay"
+    describe(axes, title, "places, from the one met again backwards", "m")
 
 
 def _draw_synapses(axes: Axes, replay: Replayed, metrics: dict[str, Any]) -> None:
@@ -126,16 +106,9 @@ def _draw_synapses(axes: Axes, replay: Replayed, metrics: dict[str, Any]) -> Non
     axes.axline((0.0, 0.0), slope=slope, color=FAINT, lw=1.0, ls=(0, (4, 2)))
     axes.plot(nearer, changes, ".", ms=5, color=SEVERAL[4], alpha=0.6)
     title = f"e   predicted change of synapses, fields under {1 / replay.decay_per_m:g} m apart"
-    axes.set_title(f"{title}: {slope:.3f} a metre, r = {r:.2f}", loc="left", fontsize=10)
-    _label(
+    describe(
         axes,
+        f"{title}: {slope:.3f} a metre, r = {r:.2f}",
         "by how much two place fields come nearer, m",
         f"change of exp(-{replay.decay_per_m:g} d)",
     )
-
-
-def _label(axes: Axes, x: str, y: str) -> None:
-    axes.set_xlabel(x, color=FAINT)
-    axes.set_ylabel(y, color=FAINT)
-    axes.tick_params(colors=FAINT, length=3)
-    axes.set_facecolor(PAPER)

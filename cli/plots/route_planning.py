@@ -12,19 +12,17 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from cogmap.cli.plots.draw import STYLE
 from cogmap.cli.plots.palette import (
     ESTIMATE,
     FAINT,
-    INK,
     KERB,
-    PAPER,
     ROAD,
     SEVERAL,
     STREET,
     TRUE,
     WHEELS,
 )
+from cogmap.cli.plots.sheet import describe, new_sheet, remove_scales
 from cogmap.experiments.route_planning import published
 from cogmap.experiments.route_planning.activation import Spread, free_ground, walled_ground
 from cogmap.experiments.route_planning.measure import EXAMPLE_GOALS, Planned
@@ -57,38 +55,25 @@ def figure(human: Sequence[Planned], drawn: Sequence[Planned], metrics: dict[str
     those of people one by one.
     """
     example = next(problem for problem in drawn if problem.goals == EXAMPLE_GOALS)
-    with mpl.rc_context(STYLE):
-        sheet = Figure(figsize=(15.0, 10.0), dpi=110, facecolor=PAPER, layout="constrained")
+    title = (
+        f"Figure 5 from our own runs, {metrics['participants']:g} simulated participants on "
+        f"each problem of people, {metrics['participants_of_drawn_problems']:g} on the others"
+    )
+    with new_sheet(15.0, 10.0, title) as sheet:
         parts: Any = sheet.subfigures(2, 1, height_ratios=(1, 1.35))
-        for part in parts:
-            part.set_facecolor(PAPER)
+        above, below = parts
+        free, walled, flat, hierarchical = above.subplots(1, 4)
+        _draw_activation(free, free_ground(), "a   one goal, by activation")
+        _draw_activation(walled, walled_ground(), "b   the same with walls")
+        _draw_tour(flat, example, example.typical_flat, "flat", "c   flat")
+        _draw_tour(hierarchical, example, example.typical, "hierarchical", "d   hierarchy")
+        _draw_grids(hierarchical, example.positions, TourSettings())
 
-        _draw_principle(parts[0].subplots(1, 4), example)
-        sizes, people, errors = parts[1].subplots(1, 3)
+        sizes, people, errors = below.subplots(1, 3)
         _draw_sizes(sizes, drawn)
         _draw_people(people, human)
         _draw_errors(errors, human, metrics)
-        sheet.suptitle(
-            f"Figure 5 from our own runs, {metrics['participants']:g} simulated participants on "
-            f"each problem of people, {metrics['participants_of_drawn_problems']:g} on the others",
-            x=0.01,
-            ha="left",
-            color=INK,
-            fontsize=12,
-            fontweight="bold",
-        )
-        sheet.draw_without_rendering()
     return sheet
-
-
-def _draw_principle(panels: Sequence[Axes], example: Planned) -> None:
-    """One goal by activation, without walls and with them, and several goals."""
-    free, walled, flat, hierarchical = panels
-    _draw_activation(free, free_ground(), "a   one goal, by activation")
-    _draw_activation(walled, walled_ground(), "b   the same with walls")
-    _draw_tour(flat, example, example.typical_flat, "flat", "c   flat")
-    _draw_tour(hierarchical, example, example.typical, "hierarchical", "d   hierarchy")
-    _draw_grids(hierarchical, example.positions, TourSettings())
 
 
 def _draw_activation(axes: Axes, ground: Spread, title: str) -> None:
@@ -100,8 +85,8 @@ def _draw_activation(axes: Axes, ground: Spread, title: str) -> None:
     axes.plot(*ground.route.T, color=ESTIMATE, lw=2.0)
     axes.plot(*start, "s", ms=8, mfc="white", mec=TRUE)
     axes.plot(*goal, "*", ms=14, color=PUBLISHED, mec="white")
-    axes.set_title(title, loc="left", fontsize=10)
-    _without_scales(axes)
+    describe(axes, title)
+    remove_scales(axes)
 
 
 def _draw_tour(axes: Axes, problem: Planned, tour: Indices, name: str, title: str) -> None:
@@ -112,23 +97,19 @@ def _draw_tour(axes: Axes, problem: Planned, tour: Indices, name: str, title: st
     axes.plot(*positions.T, "o", ms=6, color=TRUE, mec="white", zorder=4)
     axes.plot(*line[0], "s", ms=9, mfc="white", mec=TRUE, zorder=4)
     axes.set_aspect("equal")
-    _without_scales(axes)
 
-    shortest = _length(_closed(positions, problem.shortest))
-    above = _length(line) / shortest - 1
-    axes.set_title(f"{title}: {above:.1%} above the shortest", loc="left", fontsize=10)
+    shortest_m, length_m = (
+        float(np.hypot(*np.diff(each, axis=0).T).sum())
+        for each in (_closed(positions, problem.shortest), line)
+    )
+    describe(axes, f"{title}: {length_m / shortest_m - 1:.1%} above the shortest")
+    remove_scales(axes)
 
 
 def _closed(positions: Floats, tour: Indices) -> Floats:
     """(n + 1, 2): the line of a tour, back to where it begins."""
     line: Floats = positions[np.append(tour, tour[0])]
     return line
-
-
-def _length(line: Floats) -> float:
-    steps = np.diff(line, axis=0)
-    lengths = np.hypot(*steps.T)
-    return float(lengths.sum())
 
 
 def _draw_grids(axes: Axes, positions: Floats, settings: TourSettings) -> None:
@@ -167,8 +148,7 @@ def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
         title=f"* {published.READ_OFF_BY_EYE}",
         title_fontsize=7,
     )
-    axes.set_title("e   drawn at random, by number of goals", loc="left", fontsize=10)
-    _label(axes, "goals", "% above the shortest")
+    describe(axes, "e   drawn at random, by number of goals", "goals", "% above the shortest")
 
 
 def _draw_published(axes: Axes) -> None:
@@ -185,10 +165,9 @@ def _draw_published(axes: Axes) -> None:
 
 def _draw_people(axes: Axes, human: Sequence[Planned]) -> None:
     """People's quartiles on each problem, the medians of the model and of the flat map."""
-    axes.set_title("f   problems that people drew tours of", loc="left", fontsize=10)
-    _label(axes, "", "% above the shortest")
+    describe(axes, "f   problems that people drew tours of", y="% above the shortest")
     if not human:
-        _draw_nothing(axes)
+        _note_absence(axes)
         return
 
     quartiles = 100 * np.array([problem.people_quartiles for problem in human])
@@ -216,10 +195,10 @@ def _medians_percent(human: Sequence[Planned], name: str) -> list[float]:
 
 def _draw_errors(axes: Axes, human: Sequence[Planned], metrics: dict[str, Any]) -> None:
     """The mean excess of the model against that of people, a point each problem."""
-    axes.set_title("g   do they err on the same problems?", loc="left", fontsize=10)
-    _label(axes, "people, mean % above the shortest", "model, mean % above the shortest")
+    mean = "mean % above the shortest"
+    describe(axes, "g   do they err on the same problems?", f"people, {mean}", f"model, {mean}")
     if not human:
-        _draw_nothing(axes)
+        _note_absence(axes)
         return
 
     people = [100 * problem.people.mean() for problem in human]
@@ -239,19 +218,7 @@ def _leave_room(axes: Axes) -> None:
     axes.set_ylim(-0.03 * top, 1.45 * top)
 
 
-def _without_scales(axes: Axes) -> None:
-    axes.set_xticks([])
-    axes.set_yticks([])
-    axes.set_facecolor(PAPER)
-
-
-def _draw_nothing(axes: Axes) -> None:
-    _without_scales(axes)
+def _note_absence(axes: Axes) -> None:
+    """Show that there are no people's tours to draw."""
+    remove_scales(axes)
     axes.text(0.5, 0.5, "no people's tours: see --data", ha="center", color=FAINT)
-
-
-def _label(axes: Axes, x: str, y: str) -> None:
-    axes.set_xlabel(x, color=FAINT)
-    axes.set_ylabel(y, color=FAINT)
-    axes.tick_params(colors=FAINT, length=3)
-    axes.set_facecolor(PAPER)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -13,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull, QhullError
 
-from cogmap.cli.plots.draw import STYLE
 from cogmap.cli.plots.palette import FAINT, HOUSE, INK, KERB, PAPER, SEVERAL, STREET, WALL
+from cogmap.cli.plots.sheet import new_sheet
 from cogmap.experiments.map_structure.functions import FUNCTIONS
 from cogmap.experiments.map_structure.measure import Structured
 from cogmap.geometry.arrays import Floats, Indices
@@ -31,22 +30,12 @@ def figure(found: Sequence[Structured]) -> Figure:
     """The sheet: a map of each city, and beside it the functions of its sub-maps."""
     rows = -(-len(found) // COLUMNS)
     columns = min(COLUMNS, len(found))
-    with mpl.rc_context(STYLE):
-        sheet = Figure(
-            figsize=(1.4 * PANEL_INCHES * columns, PANEL_INCHES * rows),
-            dpi=110,
-            facecolor=PAPER,
-            layout="constrained",
-        )
+    with new_sheet(1.4 * PANEL_INCHES * columns, PANEL_INCHES * rows) as sheet:
         parts: Any = sheet.subfigures(rows, columns, squeeze=False)
-        for part in parts.ravel():
-            part.set_facecolor(PAPER)
         for part, each in zip(parts.ravel(), found, strict=False):
             town, mixes = part.subplots(1, 2, width_ratios=(3, 1))
             _draw_city(town, each)
             _draw_functions(mixes, each)
-
-        sheet.draw_without_rendering()
     return sheet
 
 

@@ -1,8 +1,6 @@
-"""What a drive cannot begin with, found before any process is started."""
+"""Checks the inputs of a drive before any process is started."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 from cogmap.cli.launch.plan import MEMORY, Choices
 from cogmap.cli.memory.show import checked
@@ -18,27 +16,20 @@ SIM = "sim"
 
 
 def check_inputs(sections: Sections, choices: Choices) -> None:
-    """Raise the CogmapError with which a module of the drive would end as it starts: of a file of
-    schemes, of the settings of the simulation or the extract of its town, of the database of
-    long-term memory. What belongs to a module that somebody else starts is not checked.
+    """Raise the CogmapError with which a module of the drive would end as it starts, for its file
+    of schemes, the settings of the simulation, the extract of its town, or the database of
+    long-term memory. Inputs of modules that somebody else starts are not checked.
     """
     if PROCEDURAL not in choices.without:
         registry.build(PROCEDURAL, sections)
+
     if SIM not in choices.without:
-        _check_town(config.typed(sections, SIM, Config), config.typed(sections, SECTION, Run))
-    if MEMORY not in choices.without and choices.memory is not None:
-        _check_memory(choices.memory)
+        settings = config.typed(sections, SIM, Config)
+        check(settings, config.typed(sections, SECTION, Run))
+        if settings.town.startswith(towns.OSM):  # one from a seed takes seconds, and cannot fail
+            towns.place(settings.town, settings.seed, settings.town_size_m)
 
-
-def _check_town(settings: Config, run: Run) -> None:
-    """A town from a seed is made by the simulation alone: a large one takes seconds."""
-    check(settings, run)
-    if settings.town.startswith(towns.OSM):
-        towns.place(settings.town, settings.seed, settings.town_size_m)
-
-
-def _check_memory(path: Path) -> None:
-    """Check all of a database that there is."""
-    if path.exists():
-        with checked(path):
+    memory = choices.memory
+    if MEMORY not in choices.without and memory is not None and memory.exists():
+        with checked(memory):
             return

@@ -1,4 +1,4 @@
-"""`cogmap run`: a drive around the simulated town, every module a process of its own."""
+"""`cogmap run`: a drive through a simulated town, every module a process of its own."""
 
 from __future__ import annotations
 
@@ -40,35 +40,35 @@ from cogmap.services import registry
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
-    help="A new folder for its files.  [default: runs/TIME]",
+    help="A new folder for the files of the run.  [default: runs/TIME]",
 )
 @click.option(
     "--memory",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Remember earlier runs, and this one, in the database FILE.  [default: this run alone]",
+    help="Use the long-term memory in the database FILE, and keep this run there.  "
+    "[default: an empty memory]",
 )
-@click.option(
-    "--record/--no-record", default=True, help="Whether to keep a log of all that travels."
-)
+@click.option("--record/--no-record", default=True, help="Record all messages in a log, or none.")
 @click.option(
     "--time-limit",
     type=FiniteRange(5, 1e6),
     metavar="SECONDS",
-    help=f"End after so long, start and end included.  [default: {LAP_LIMIT_S:g} for each lap]",
+    help="End after this much time, start and end included.  "
+    f"[default: {LAP_LIMIT_S:g} for each lap]",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 @click.option(
     "--router",
     metavar="ENDPOINT",
-    help="Use the router that listens there, such as zenohd, and start none.",
+    help="Use the router that listens there, for example zenohd, instead of starting one.",
 )
 @click.option(
     "--without",
     multiple=True,
     type=click.Choice([*registry.MODULES, "all"]),
     metavar="MODULE",
-    help="Start all modules but this, and wait for yours; repeat at will, or `all`.",
+    help="Do not start this module, but wait for yours; may be repeated, or `all`.",
 )
 @connect_option
 @agent_option
@@ -96,11 +96,11 @@ def run(
     config_path: Path | None,
     settings: tuple[str, ...],
 ) -> None:
-    """Drive the robot through a simulated town: to goals, by routes of its own, or exploring.
+    """Drive the robot through a simulated town: to goals, by routes that it plans, or exploring.
 
-    Starts a router and every module as a process of its own, shows how the drive proceeds, and
-    leaves a folder with the log, a map and a summary, which runs/latest links to. Ends with 0
-    where every goal was reached, 130 after Ctrl-C, else with 1; the summary gives the reason.
+    Starts a router and every module as a process of its own, shows the progress, and writes a log,
+    a map and a summary into a new folder, which runs/latest links to. Ends with 0 if every goal
+    was reached, with 130 after Ctrl-C, else with 1; the summary gives the reason.
     """
     with fork_server() as server:
         # While the server imports what it is to fork, this process imports what it needs itself.

@@ -1,4 +1,4 @@
-"""What `cogmap run` does once its options are read."""
+"""Runs a drive once the options of `cogmap run` are read."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ FINISH_S = 4.0
 
 @dataclass(frozen=True)
 class Start:
-    """What the options of `cogmap run` ask for: `given` are the settings, `out` the folder of its
-    files, a new one of RUNS where it is None, and without `time_limit_s` it is the default.
+    """The options of `cogmap run`: `given` are the settings, `out` is the folder of its files, if
+    None a new one in RUNS; `time_limit_s` is the default if it is None.
     """
 
     choices: Choices
@@ -92,30 +92,22 @@ def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
 
 
 def _introduce(screen: Display, drive: Drive) -> None:
-    screen.show(f"{_town(drive)}, files in {drive.folder}")
+    """Show the town, the folder and the goals, and what the user has to start."""
+    sim = drive.sections["sim"]
+    names = {LOOP: f"town {sim['seed']}", BLOCKS: f"town {sim['seed']} of blocks"}
+    town = names.get(sim["town"], f"the town in {sim['town'].removeprefix(OSM)}")
+    screen.show(f"{town}, files in {drive.folder}")
+
     if drive.goals:
         order = "in order" if drive.sections["workspace"]["in_order"] else "in an order of its own"
         explore_s = drive.choices.explore_s
         if explore_s is not None:
             screen.show(f"the agent explores the town for {explore_s:g} s")
         screen.show(f"its goals, {order}: {drive.goals}")
-    if not drive.choices.without:
-        return
-
-    names = ", ".join(drive.choices.without)
-    config_path = drive.folder / CONFIG_NAME
-    screen.show(f"start {names} yourself with --connect {drive.endpoint} --config {config_path}")
-
-
-def _town(drive: Drive) -> str:
-    """The town of a drive, in words."""
-    sim = drive.sections["sim"]
-    if sim["town"] == LOOP:
-        return f"town {sim['seed']}"
-    if sim["town"] == BLOCKS:
-        return f"town {sim['seed']} of blocks"
-
-    return f"the town in {sim['town'].removeprefix(OSM)}"
+    if drive.choices.without:
+        modules = ", ".join(drive.choices.without)
+        options = f"--connect {drive.endpoint} --config {drive.folder / CONFIG_NAME}"
+        screen.show(f"start {modules} yourself with {options}")
 
 
 def _new_folder(out: Path | None) -> Path:
@@ -125,8 +117,10 @@ def _new_folder(out: Path | None) -> Path:
     folder = out or RUNS / time.strftime("%Y-%m-%d-%H%M%S")
     try:
         folder.mkdir(parents=True)
-        if out is None:
-            _link_latest(folder)
+        if out is None:  # the link leads to a folder at any moment: it is replaced, not removed
+            link = RUNS / f".latest-{folder.name}"
+            link.symlink_to(folder.name)
+            link.replace(RUNS / "latest")
     except FileExistsError:
         raise ConfigError(f"{folder} exists already: name another with --out") from None
     except OSError as error:
@@ -134,14 +128,6 @@ def _new_folder(out: Path | None) -> Path:
             f"cannot make the folder {folder} ({error.strerror}): name another with --out"
         ) from None
     return folder
-
-
-def _link_latest(folder: Path) -> None:
-    """Let the link `latest` beside `folder` lead to it, at no moment nowhere."""
-    latest = folder.with_name("latest")
-    new = folder.with_name(f".latest-{folder.name}")
-    new.symlink_to(folder.name)
-    new.replace(latest)
 
 
 @contextmanager

@@ -59,7 +59,6 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
         "noise": msgspec.structs.asdict(noise),
         "percepts": {"field_of_view_rad": FIELD_OF_VIEW_RAD},
         "frame_hz": FRAME_HZ,
-        "odometry_hz": FRAME_HZ,
     }
     workspace = {"cell_m": CELL_M, "base_level_decay": 0.0}
 

@@ -27,7 +27,7 @@ from cogmap.schemas.sensing import Odometry, Percept, Percepts, View
 from cogmap.services import registry
 from cogmap.services.sim.layout import roadside
 from cogmap.services.sim.rendering.camera import StereoCamera
-from cogmap.services.sim.scripted.trajectory import Trajectory
+from cogmap.services.sim.trajectory import Trajectory
 from cogmap.services.sim.world import World
 
 SCALE = 10.0

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.services.sim.odometry import Noise
-from cogmap.services.sim.scripted.trajectory import Line
+from cogmap.services.sim.trajectory import Line
 
 Floats = npt.NDArray[np.float64]
 

@@ -15,7 +15,7 @@ from cogmap.parallel import Progress
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
 from cogmap.services import registry
-from cogmap.services.sim.config import Config
+from cogmap.services.sim.config import ODOMETRY_HZ
 from cogmap.services.sim.odometry import Noise
 
 COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
@@ -40,7 +40,7 @@ FRAME_HZ = 2
 CELL_M = 3.0
 # The wheels of the town's robot, read ten times between two views: each reading's factors err anew,
 # drift adds up.
-READINGS = Config().odometry_hz // FRAME_HZ
+READINGS = ODOMETRY_HZ // FRAME_HZ
 NOISE = Noise(speed=Noise().speed / READINGS**0.5, turn=Noise().turn / READINGS**0.5)
 
 
@@ -75,7 +75,6 @@ def sections(seed: int, method: str) -> Sections:
         "noise": msgspec.structs.asdict(NOISE),
         "trajectory": trajectory(),
         "frame_hz": FRAME_HZ,
-        "odometry_hz": FRAME_HZ,
     }
 
     workspace = {"cell_m": CELL_M, "base_level_decay": 0.0}

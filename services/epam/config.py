@@ -86,7 +86,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             description="a segment is a percept if it shows a building with a higher probability. "
             "LIDA: 0.7 of total activation; here of that probability, because which building it "
-            "is, is decided by its evidence (`workspace.recognition_threshold`)"
+            "is, is decided by its evidence when it enters the workspace"
         ),
     ] = 0.7
     familiar: Annotated[

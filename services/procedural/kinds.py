@@ -77,22 +77,19 @@ class NodeKinds:
         Raises ValueError where it is no such value.
         """
         if self.fields(kind) is not None:
-            value = self._converted(kind, field, value)
+            fields = msgspec.structs.fields(self._types[kind])
+            wanted = {each.encode_name: each.type for each in fields}[field]
+            if isinstance(wanted, type) and issubclass(wanted, enum.Enum):
+                named = {name.lower(): member for name, member in wanted.__members__.items()}
+                value = named.get(value, value)
+                if value not in named.values():
+                    raise ValueError(f"{value!r} is none of {', '.join(named)}")
+
+            try:
+                value = msgspec.convert(value, wanted)
+            except msgspec.ValidationError as error:
+                raise ValueError(f"{value!r}: {error}") from None
+
         if not isinstance(value, bool | int | float | str):
             raise ValueError(f"{value!r} is neither a number, a word, true nor false")
         return value
-
-    def _converted(self, kind: str, field: str, value: Any) -> Any:
-        types = {each.encode_name: each.type for each in msgspec.structs.fields(self._types[kind])}
-        wanted = types[field]
-        if isinstance(wanted, type) and issubclass(wanted, enum.Enum):
-            named = {name.lower(): member for name, member in wanted.__members__.items()}
-            if value in named:
-                return named[value]
-            if value not in named.values():
-                raise ValueError(f"{value!r} is none of {', '.join(named)}")
-
-        try:
-            return msgspec.convert(value, wanted)
-        except msgspec.ValidationError as error:
-            raise ValueError(f"{value!r}: {error}") from None

@@ -64,7 +64,9 @@ class Reliability:
         scheme = self._schemes.get(action.scheme)
         if scheme is not None and scheme.adding:
             until_ns = action.stamp_ns + round(scheme.within_s * 1e9)
-            self._running = Execution(scheme, _bindings_of(action), until_ns)
+            chosen = (each for each in action.behaviours if each.scheme == action.scheme)
+            bindings = next((behaviour.bindings for behaviour in chosen), {})
+            self._running = Execution(scheme, bindings, until_ns)
 
     def judge(self, nodes: Sequence[Active], stamp_ns: int) -> None:
         """Whether the results of what is executed have come true in the situation of a time."""
@@ -93,11 +95,3 @@ class Reliability:
             executions=record.executions,
             successes=record.successes,
         )
-
-
-def _bindings_of(action: Action) -> Mapping[str, str]:
-    """The bindings of the behaviour that was chosen."""
-    for behaviour in action.behaviours:
-        if behaviour.scheme == action.scheme:
-            return behaviour.bindings
-    return {}

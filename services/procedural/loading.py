@@ -113,7 +113,15 @@ def load_guidance(path: Path) -> list[GuidanceScheme]:
 
 
 def _decoded(path: Path) -> tuple[Source, SchemeFile]:
-    text = _read(path)
+    try:
+        text = path.read_text()
+    except FileNotFoundError:
+        raise ConfigError(
+            f"no file of schemes {path}: name one that exists, or leave procedural.schemes out"
+        ) from None
+    except (UnicodeDecodeError, OSError) as error:
+        raise ConfigError(f"cannot read {path} as TOML: {error}") from None
+
     source = Source(path, text)
     try:
         return source, msgspec.convert(tomllib.loads(text), SchemeFile)
@@ -121,17 +129,6 @@ def _decoded(path: Path) -> tuple[Source, SchemeFile]:
         raise ConfigError(f"cannot read {path} as TOML: {error}") from None
     except msgspec.ValidationError as error:
         raise _located(source, str(error)) from None
-
-
-def _read(path: Path) -> str:
-    try:
-        return path.read_text()
-    except FileNotFoundError:
-        raise ConfigError(
-            f"no file of schemes {path}: name one that exists, or leave procedural.schemes out"
-        ) from None
-    except (UnicodeDecodeError, OSError) as error:
-        raise ConfigError(f"cannot read {path} as TOML: {error}") from None
 
 
 def _located(source: Source, error: str) -> ConfigError:
@@ -212,20 +209,23 @@ class _Reader:
         for field, value in table.items():
             if field not in (KIND, VARIABLE, FEELING):
                 conditions.append(self._condition(kind, field, value))
-        return Pattern(kind, tuple(conditions), variable, self._feelings(table.get(FEELING, [])))
 
-    def _feelings(self, value: Any) -> tuple[Feeling, ...]:
-        """The feelings that are named, one or several."""
-        names = value if isinstance(value, list) else [value]
+        named = table.get(FEELING, [])
+        names = named if isinstance(named, list) else [named]
         for name in names:
             if name not in FEELINGS:
                 raise self._unknown(FEELING, str(name), FEELINGS)
-        return tuple(Feeling(name) for name in names)
+        return Pattern(kind, tuple(conditions), variable, tuple(Feeling(name) for name in names))
 
     def _condition(self, kind: str, field: str, value: Any) -> Condition:
         self._check_field(kind, field)
         if isinstance(value, dict):
-            return self._range(field, value)
+            for name, bound in value.items():
+                if name not in BOUNDS:
+                    raise self._unknown("bound", name, BOUNDS)
+                if isinstance(bound, bool) or not isinstance(bound, int | float):
+                    raise self._error(name, f"has the bound {bound!r}, which is no number")
+            return Condition(field, **value)
 
         values = value if isinstance(value, list) else [value]
         try:
@@ -242,14 +242,6 @@ class _Reader:
         """Refuse a word for a need or a function that there is none of; empty, it is of none."""
         if meaning and word and word not in self._kinds.known(meaning):
             raise self._unknown(meaning, str(word), self._kinds.known(meaning))
-
-    def _range(self, field: str, bounds: dict[str, Any]) -> Condition:
-        for name, bound in bounds.items():
-            if name not in BOUNDS:
-                raise self._unknown("bound", name, BOUNDS)
-            if isinstance(bound, bool) or not isinstance(bound, int | float):
-                raise self._error(name, f"has the bound {bound!r}, which is no number")
-        return Condition(field, **bounds)
 
     def _parameters(self) -> dict[str, Scalar | Reference]:
         """The parameters, which are those of the motor program, where that is one of ours."""

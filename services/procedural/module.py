@@ -108,10 +108,10 @@ class ProceduralMemory:
                 is_settled = self._situations.is_settled(first.cycle)
                 if not is_settled or not (is_answered or is_lost):
                     break
-            published.append(self._behaviours(self._waiting.pop(0)))
+            published.append(self._bring_to_mind(self._waiting.pop(0)))
         return published
 
-    def _behaviours(self, broadcast: Broadcast) -> Behaviours:
+    def _bring_to_mind(self, broadcast: Broadcast) -> Behaviours:
         nodes = self._situations.of(broadcast)
         self._reliability.judge(nodes, broadcast.stamp_ns)
         learned = self._guidance.on_broadcast(broadcast)

@@ -40,9 +40,6 @@ class Condition:
             return False
         if self.values and value not in self.values:
             return False
-        return self._is_within(value)
-
-    def _is_within(self, value: Scalar) -> bool:
         if self.at_least is None and self.at_most is None:
             return True
         if not isinstance(value, int | float):
@@ -53,7 +50,11 @@ class Condition:
         return is_enough and is_little
 
     def __str__(self) -> str:
-        text = "" if not self.values else "=" + "|".join(_spelled(value) for value in self.values)
+        words = []
+        for value in self.values:
+            words.append(value.name.lower() if isinstance(value, enum.Enum) else str(value))
+
+        text = f"={'|'.join(words)}" if words else ""
         if self.at_least is not None:
             text += f">={self.at_least:g}"
         if self.at_most is not None:
@@ -76,9 +77,16 @@ class Pattern:
     def match(self, nodes: Iterable[Active], bindings: Bindings) -> Active | None:
         """The most active node that matches, of equals the first by id; None where none does."""
         wanted = bindings.get(self.variable)
-        found = [each for each in nodes if self._matches(each)]
-        if wanted is not None:
-            found = [each for each in found if each.node.id == wanted]
+        found = []
+        for active in nodes:
+            node = active.node
+            if kind_of(node) != self.kind or (wanted is not None and node.id != wanted):
+                continue
+            if self.feelings and active.feeling not in self.feelings:
+                continue
+            if all(condition.holds(node) for condition in self.conditions):
+                found.append(active)
+
         return min(found, key=lambda each: (-each.activation, each.node.id), default=None)
 
     def spelled(self, bindings: Bindings) -> str:
@@ -92,13 +100,6 @@ class Pattern:
             words.append(str(Condition("feeling", self.feelings)))
         return " ".join(words)
 
-    def _matches(self, active: Active) -> bool:
-        if kind_of(active.node) != self.kind:
-            return False
-        if self.feelings and active.feeling not in self.feelings:
-            return False
-        return all(condition.holds(active.node) for condition in self.conditions)
-
 
 def value_of(node: GraphNode, field: str) -> Scalar | None:
     """A field of a node, or an attribute of a node of a kind that is not known here; None where it
@@ -109,9 +110,3 @@ def value_of(node: GraphNode, field: str) -> Scalar | None:
 
     value = getattr(node, field, None)
     return value if isinstance(value, bool | int | float | str) else None
-
-
-def _spelled(value: Scalar) -> str:
-    if isinstance(value, enum.Enum):
-        return value.name.lower()
-    return str(value)

@@ -58,18 +58,36 @@ class Scheme:
         return min(1.0, mean_context + mean_adding)
 
     def considered(self, nodes: Sequence[Active], threshold: float) -> Behaviour:
-        """What nodes make of the scheme: a behaviour, rejected where part of its context is missing
+        """The behaviour that nodes make of the scheme, rejected if part of its context is missing
         or it is less active than `threshold`.
         """
-        match = _match(self.context, nodes)
-        activation = self.activation(match.activations)
+        # Each pattern takes the most active node that is left to it by the variables before.
+        bindings: dict[str, str] = {}
+        bound: dict[str, Active] = {}
+        activations = []
+        for pattern in self.context:
+            active = pattern.match(nodes, bindings)
+            activations.append(0.0 if active is None else active.activation)
+            if active is not None and pattern.variable:
+                bindings[pattern.variable] = active.node.id
+                bound[pattern.variable] = active
+
+        activation = self.activation(activations)
         rejection = Rejection.NONE
-        if min(match.activations) <= 0.0:
+        if min(activations) <= 0.0:
             rejection = Rejection.CONTEXT_MISSING
         elif activation < threshold:
             rejection = Rejection.NOT_INSTANTIATED
 
-        bindings = {name: active.node.id for name, active in match.bound.items()}
+        parameters: dict[str, Scalar] = {}
+        for name, value in self.parameters.items():
+            if not isinstance(value, Reference):
+                parameters[name] = value
+            elif value.variable in bound:
+                found = value_of(bound[value.variable].node, value.field)
+                if found is not None:
+                    parameters[name] = found
+
         spelled = [pattern.spelled(bindings) for pattern in self.context]
         return Behaviour(
             scheme=self.name,
@@ -77,8 +95,8 @@ class Scheme:
             rejection=rejection,
             action=self.action,
             bindings=bindings,
-            parameters=self._parameters(match.bound),
-            context=dict(zip(spelled, match.activations, strict=True)),
+            parameters=parameters,
+            context=dict(zip(spelled, activations, strict=True)),
             adding={each.pattern.spelled(bindings): each.salience for each in self.adding},
             deleting=[pattern.spelled(bindings) for pattern in self.deleting],
         )
@@ -86,39 +104,3 @@ class Scheme:
     def has_come_true(self, nodes: Sequence[Active], bindings: Mapping[str, str]) -> bool:
         """Whether all that the action was expected to bring about is there."""
         return all(result.pattern.match(nodes, bindings) for result in self.adding)
-
-    def _parameters(self, bound: Mapping[str, Active]) -> dict[str, Scalar]:
-        parameters: dict[str, Scalar] = {}
-        for name, value in self.parameters.items():
-            if not isinstance(value, Reference):
-                parameters[name] = value
-                continue
-            active = bound.get(value.variable)
-            found = None if active is None else value_of(active.node, value.field)
-            if found is not None:
-                parameters[name] = found
-
-        return parameters
-
-
-class _Match(NamedTuple):
-    """The activation of each pattern of a context, 0 where no node matches, and the nodes that its
-    variables stand for.
-    """
-
-    activations: list[float]
-    bound: dict[str, Active]
-
-
-def _match(context: Sequence[Pattern], nodes: Sequence[Active]) -> _Match:
-    """Each pattern takes the most active node that is left to it by the variables before."""
-    bindings: dict[str, str] = {}
-    match = _Match([], {})
-    for pattern in context:
-        active = pattern.match(nodes, bindings)
-        match.activations.append(0.0 if active is None else active.activation)
-        if active is not None and pattern.variable:
-            bindings[pattern.variable] = active.node.id
-            match.bound[pattern.variable] = active
-
-    return match

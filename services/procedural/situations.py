@@ -56,7 +56,13 @@ class Situations:
         self._is_settled = phase not in BEFORE_POSE
         has_pose = not self._is_settled or phase is Phase.LOCALIZATION
         if has_pose or graph.cycle not in self._nodes:
-            self._keep(graph)
+            nodes = []
+            for kind in self._kinds:
+                for node in graph.of_kind(kind):
+                    nodes.append(Active(node, self._share * graph.total_activation(node)))
+            self._nodes[graph.cycle] = tuple(nodes)
+        while len(self._nodes) > REMEMBERED_CYCLES:
+            del self._nodes[min(self._nodes)]
 
     def is_settled(self, cycle: int) -> bool:
         """Whether the pose of a cycle is committed, or that of a later one."""
@@ -69,23 +75,12 @@ class Situations:
             activation = min(1.0, node.base_level + node.activation)
             nodes.append(Active(node, activation, broadcast.coalition.feeling))
 
+        if not self._nodes:
+            return tuple(nodes)
+
+        # Of the last cycle up to that of the broadcast, of the oldest one if none is as old.
         known = {active.node.id for active in nodes}
-        nodes += [each for each in self._at(broadcast.cycle) if each.node.id not in known]
+        cycles = [each for each in self._nodes if each <= broadcast.cycle]
+        kept = self._nodes[max(cycles, default=min(self._nodes))]
+        nodes += [each for each in kept if each.node.id not in known]
         return tuple(nodes)
-
-    def _at(self, cycle: int) -> tuple[Active, ...]:
-        """The nodes of the last cycle up to this one, of the newest one where none is as old."""
-        cycles = [each for each in self._nodes if each <= cycle]
-        if cycles:
-            return self._nodes[max(cycles)]
-        return self._nodes[min(self._nodes)] if self._nodes else ()
-
-    def _keep(self, graph: Graph) -> None:
-        nodes = []
-        for kind in self._kinds:
-            for node in graph.of_kind(kind):
-                nodes.append(Active(node, self._share * graph.total_activation(node)))
-
-        self._nodes[graph.cycle] = tuple(nodes)
-        while len(self._nodes) > REMEMBERED_CYCLES:
-            del self._nodes[min(self._nodes)]

@@ -17,8 +17,8 @@ class Source:
     """The text of a file of schemes.
 
     TOML's reader gives no line numbers, so a word is searched for among the lines of its scheme: of
-    those that have it, the first with most of the words that stand `near` it. Where none has it,
-    the scheme's first line is named.
+    those that have it, the first with most of the words that stand `near` it. If none has it, the
+    scheme's first line is named.
     """
 
     def __init__(self, path: Path, text: str) -> None:
@@ -43,7 +43,16 @@ class Source:
         """An error about a word in the scheme of that number, from 0, among those of a table of
         TOML; None where it is in none.
         """
-        first, end = self._block(scheme, table)
+        bounds = [*self._headers, len(self._lines)]
+        headers = self._of_table.get(table, [])
+        if scheme is None:
+            first, end = 0, bounds[0]
+        elif scheme >= len(headers):
+            first, end = 0, len(self._lines)
+        else:
+            place = self._headers.index(headers[scheme])
+            first, end = bounds[place], bounds[place + 1]
+
         found = [number for number in range(first, end) if self._has(number, word)]
         words = [*near]
 
@@ -52,17 +61,6 @@ class Source:
 
         number = max(found, key=share, default=first)
         return ConfigError(f"{self._path}:{number + 1}: {text}")
-
-    def _block(self, scheme: int | None, table: str) -> tuple[int, int]:
-        """The first line of a scheme, and the one after its last."""
-        bounds = [*self._headers, len(self._lines)]
-        if scheme is None:
-            return 0, bounds[0]
-        headers = self._of_table.get(table, [])
-        if scheme >= len(headers):
-            return 0, len(self._lines)
-        number = self._headers.index(headers[scheme])
-        return bounds[number], bounds[number + 1]
 
     def _has(self, number: int, word: str) -> bool:
         """Whether a line has a word, outside comments."""

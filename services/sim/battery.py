@@ -84,17 +84,15 @@ class PowerSupply:
             return
 
         stands = moved_m <= STANDS_M_S * dt_s
-        self._is_charging = stands and self._is_at_place(pose, battery.charge_within_m)
+        here_m = (pose.x_m, pose.y_m)
+        away_m = min((math.dist(here_m, at_m) for at_m in self._places_m), default=math.inf)
+        self._is_charging = stands and away_m <= battery.charge_within_m
         if self._is_charging:
             self._level = min(1.0, self._level + dt_s / battery.charge_s)
             return
 
         used = dt_s / battery.capacity_s + moved_m * battery.cost_per_m
         self._level = max(0.0, self._level - used)
-
-    def _is_at_place(self, pose: Pose, within_m: float) -> bool:
-        here_m = (pose.x_m, pose.y_m)
-        return any(math.dist(here_m, place_m) <= within_m for place_m in self._places_m)
 
     def sensed(self, stamp_ns: int, frame: int) -> list[Message]:
         """What the body senses of it with a view; nothing without a battery."""

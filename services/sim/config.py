@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from importlib.util import find_spec
 from typing import Annotated, Literal
 
 import msgspec
 
-from cogmap.errors import ConfigError
+from cogmap.errors import ConfigError, UsageError
 from cogmap.runtime.run import Run
-from cogmap.schemas.base import PositiveSeconds
 from cogmap.services.sim.battery import Battery
 from cogmap.services.sim.layout import towns
 from cogmap.services.sim.layout.catalogue import CATALOGUE
@@ -16,13 +16,17 @@ from cogmap.services.sim.layout.closures import Closure
 from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.removals import Removal
 from cogmap.services.sim.odometry import Noise
-from cogmap.services.sim.scripted.percepts import PerceptErrors
-from cogmap.services.sim.scripted.trajectory import Trajectory
+from cogmap.services.sim.percept_level.percepts import PerceptErrors
+from cogmap.services.sim.trajectory import Trajectory
 
-STEP_S = 1 / 240
-"""A step of the physics."""
+NEEDS_PYBULLET = (
+    "rendering needs pybullet, which has wheels for Python 3.11 on Linux x86-64 only: "
+    "`pip install 'cogmap[rendering]'` there, use the container, or drive at the level of "
+    "percepts, as `cogmap run --tour` does: it renders nothing"
+)
+ODOMETRY_HZ = 20
+"""Odometry messages a second, as wheel encoders of small robots are read."""
 
-Rate = Annotated[int, msgspec.Meta(ge=1, le=240)]
 Side = Annotated[int, msgspec.Meta(ge=64, le=1024)]
 
 
@@ -34,12 +38,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(ge=0, le=2**32, description="Seed of the town and of all noise, 0 to 2^32."),
     ] = 1
     frame_hz: Annotated[
-        Rate,
-        msgspec.Meta(description="Stereo frames a second, in Hz, 1 to 240; divides odometry_hz."),
+        int,
+        msgspec.Meta(ge=1, le=20, description="Stereo frames a second, in Hz, a divisor of 20."),
     ] = 5
-    odometry_hz: Annotated[
-        Rate, msgspec.Meta(description="Odometry messages a second, in Hz, 1 to 240; divides 240.")
-    ] = 20
     width_px: Annotated[
         Side, msgspec.Meta(description="Width of a camera image, in pixels, 64 to 1024.")
     ] = 320
@@ -113,31 +114,16 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Trajectory | None,
         msgspec.Meta(description="Line that the robot follows in lockstep, instead of a town."),
     ] = None
-    command_timeout_s: Annotated[
-        PositiveSeconds,
-        msgspec.Meta(
-            description="Time without a motor command after which the wheels stop, "
-            "in s of simulated time, above 0 to 3600."
-        ),
-    ] = 1.0
-    max_command_age_s: Annotated[
-        PositiveSeconds,
-        msgspec.Meta(
-            description="Age of a motor command's stamp beyond which it moves no wheel, "
-            "in s of simulated time, above 0 to 3600."
-        ),
-    ] = 2.5
-    repeat_after_s: Annotated[
-        PositiveSeconds,
-        msgspec.Meta(
-            description="Time without a motor command after which a frame is published again "
-            "in lockstep, in s of wall time, above 0 to 3600."
-        ),
-    ] = 10.0
+
+    @property
+    def renders(self) -> bool:
+        """Whether images are rendered, rather than percepts simulated."""
+        sensing = self.sensing if self.trajectory is None else self.trajectory.sensing
+        return sensing == "cameras"
 
 
 def place_of(config: Config, battery: Battery | None = None) -> Place:
-    """The town that is configured, with charging places for `battery`. Raises UsageError where
+    """Return the town that is configured, with charging places for `battery`. Raises UsageError if
     there is none.
     """
     return towns.place(
@@ -150,19 +136,13 @@ def place_of(config: Config, battery: Battery | None = None) -> Place:
 
 
 def check(config: Config, run: Run) -> None:
-    """Raise ConfigError where the rates do not divide one another, or a trajectory, or the removal
-    of buildings, is not possible as it is set up.
+    """Raise ConfigError if a town, a trajectory, or the removal of buildings, is not possible as it
+    is set up, and UsageError if images cannot be rendered here.
     """
-    if config.odometry_hz % config.frame_hz:
+    if ODOMETRY_HZ % config.frame_hz:
         raise ConfigError(
-            f"[sim] frame_hz is {config.frame_hz}: "
-            f"choose one that divides odometry_hz, {config.odometry_hz}"
-        )
-
-    steps_hz = round(1 / STEP_S)
-    if steps_hz % config.odometry_hz:
-        raise ConfigError(
-            f"[sim] odometry_hz is {config.odometry_hz}: choose one that divides {steps_hz}"
+            f"[sim] frame_hz is {config.frame_hz}: choose one that divides the odometry's rate, "
+            f"{ODOMETRY_HZ}"
         )
 
     towns.check(config.town)
@@ -177,11 +157,13 @@ def check(config: Config, run: Run) -> None:
             '[sim] removals: cameras cannot see that a building is gone: set sensing to "percepts"'
         )
 
-    if config.trajectory is not None:
-        _check_trajectory(config.trajectory, run)
+    if config.renders and find_spec("pybullet") is None:
+        raise UsageError(NEEDS_PYBULLET)
 
+    trajectory = config.trajectory
+    if trajectory is None:
+        return
 
-def _check_trajectory(trajectory: Trajectory, run: Run) -> None:
     if run.energy:
         raise ConfigError(
             "[sim] a robot that follows a trajectory needs no energy: set run.energy to false"
@@ -192,12 +174,9 @@ def _check_trajectory(trajectory: Trajectory, run: Run) -> None:
             "[sim] a robot follows a trajectory in lockstep only: set run.lockstep to true"
         )
 
-    if trajectory.sensing != "cameras":
-        return
-
     known = [kind.name for kind in CATALOGUE]
     for landmark in trajectory.landmarks:
-        if landmark.name not in known:
+        if trajectory.sensing == "cameras" and landmark.name not in known:
             raise ConfigError(
                 f"[sim] cameras see no {landmark.name!r}: name each landmark after its kind of "
                 f"building, {', '.join(known)}"

@@ -2,42 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from cogmap.schemas.base import Message
-from cogmap.schemas.process import Clock
-from cogmap.schemas.sensing import MotorCommand, TruePose, TrueTown
+from cogmap.schemas.sensing import MotorCommand
+from cogmap.services.sim.simulation import Simulation
 
 REPEAT_CHECK_NS = 1_000_000_000
 
-
-class SteppedSim(Protocol):
-    """A simulation that advances tick by tick, `ticks_per_frame` of them between two frames."""
-
-    ticks_per_frame: int
-    now_ns: int
-    progress: float
-
-    def drive(self, command: MotorCommand) -> None:
-        """Obey a motor command from now on."""
-
-    def step(self) -> list[Message]:
-        """Advance by one tick; what is measured meanwhile."""
-
-    def view(self) -> list[Message]:
-        """The next frame."""
-
-    def clock(self, rate: float) -> Clock:
-        """The simulated time."""
-
-    def truth(self) -> TruePose:
-        """The robot's true pose."""
-
-    def town(self) -> TrueTown:
-        """The place that is simulated."""
-
-    def changed_town(self) -> TrueTown | None:
-        """The place, where it has changed since the last call."""
+REPEAT_AFTER_NS = 10_000_000_000
+"""Wall time without a motor command after which a frame is published again: no cycle of a loaded
+machine takes as long, and a module that was restarted is back within it.
+"""
 
 
 class Lockstep:
@@ -45,22 +19,20 @@ class Lockstep:
     drive is over.
     """
 
-    def __init__(self, simulation: SteppedSim, repeat_after_s: float) -> None:
+    def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
-        self._repeat_after_ns = round(repeat_after_s * 1e9)
-
         self._frame_ns: int | None = None
         self._senses: list[Message] = []
         self._timed_frame_ns: int | None = None
         self._waiting_since_ns = 0
 
     def on_start(self) -> list[Message]:
-        """The town, and the first frame."""
+        """Return the town, and the first frame."""
         return [self._simulation.town(), *self._advance()]
 
     def on_command(self, command: MotorCommand) -> list[Message] | None:
-        """The next frame, after the odometry up to it; None where `command` answers another frame
-        than the last, or the last once more.
+        """Return the next frame, after the odometry up to it; None if `command` answers another
+        frame than the last, or the last once more.
         """
         if command.stamp_ns != self._frame_ns or self._simulation.progress >= 1.0:
             return None
@@ -70,8 +42,8 @@ class Lockstep:
         return self._advance()
 
     def on_timer(self, wall_ns: int) -> list[Message]:
-        """The last frame and its odometry once more, where no command has answered it for
-        `repeat_after_s` of wall time: a module that was killed may have lost it.
+        """Return the last frame and its odometry once more if no command has answered it for
+        REPEAT_AFTER_NS of wall time: a module that was killed may have lost it.
         """
         if self._frame_ns is None or self._simulation.progress >= 1.0:
             return []
@@ -80,7 +52,7 @@ class Lockstep:
             self._timed_frame_ns = self._frame_ns
             self._waiting_since_ns = wall_ns
 
-        if wall_ns - self._waiting_since_ns < self._repeat_after_ns:
+        if wall_ns - self._waiting_since_ns < REPEAT_AFTER_NS:
             return []
 
         self._waiting_since_ns = wall_ns
@@ -95,8 +67,7 @@ class Lockstep:
 
         clock = simulation.clock(0.0)
         truth = simulation.truth()
-        changed = simulation.changed_town()
-        town = [] if changed is None else [changed]
+        town = simulation.changed_town()
         view = simulation.view()
 
         self._frame_ns = simulation.now_ns

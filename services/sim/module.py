@@ -1,72 +1,88 @@
-"""The simulation as a module: frames and odometry out, motor commands in."""
+"""The simulation as a module: frames and odometry, or percepts, out; motor commands in."""
 
 from __future__ import annotations
 
+from cogmap.robot import calibration
 from cogmap.runtime.module import Module
 from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
-from cogmap.services.sim.config import Config, check
-from cogmap.services.sim.driven.percept_level import DrivenPerceptLevelSim
-from cogmap.services.sim.lockstep import REPEAT_CHECK_NS, Lockstep, SteppedSim
+from cogmap.services.sim.battery import Battery
+from cogmap.services.sim.config import ODOMETRY_HZ, Config, check, place_of
+from cogmap.services.sim.drivers.kinematic import KinematicRobot
+from cogmap.services.sim.drivers.line_follower import LineFollower
+from cogmap.services.sim.lockstep import REPEAT_CHECK_NS, Lockstep
+from cogmap.services.sim.percept_level.line_sensors import LineSensors
+from cogmap.services.sim.percept_level.senses import PerceptSenses
+from cogmap.services.sim.percept_level.surroundings import Surroundings
+from cogmap.services.sim.percept_level.town_sensors import TownSensors
 from cogmap.services.sim.real_time import RealTime
-from cogmap.services.sim.scripted.camera_level import CameraLevelSim
-from cogmap.services.sim.scripted.percept_level import PerceptLevelSim
 from cogmap.services.sim.simulation import Simulation
+from cogmap.services.sim.trajectory import Trajectory
 
 __all__ = ["Config", "build"]
 
-_ALWAYS = (topics.CLOCK, topics.TRUE_POSE, topics.TRUE_TOWN)
-_CAMERA_LEVEL = (*_ALWAYS, topics.ODOMETRY, topics.STEREO, topics.ENERGY)
-_PERCEPT_LEVEL = (*_ALWAYS, topics.SELF_MOTION, topics.SCAN, topics.ENERGY, topics.PERCEPTS)
+_ALWAYS = (topics.CLOCK, topics.TRUE_POSE, topics.TRUE_TOWN, topics.ENERGY)
+_CAMERA_LEVEL = (*_ALWAYS, topics.ODOMETRY, topics.STEREO)
+_PERCEPT_LEVEL = (*_ALWAYS, topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS)
 
 
 def build(config: Config, instance: str = "sim", run: Run = REAL_TIME) -> Module:
-    """The module `sim`. Raises ConfigError as `check` does."""
+    """Return the module `sim`. Raises ConfigError as `check` does, and UsageError if images are to
+    be rendered without pybullet.
+    """
     check(config, run)
     module = Module("sim", instance)
+    trajectory = config.trajectory
     battery = config.battery if run.energy else None
-    if config.trajectory is not None:
-        # The robot follows it, whatever it is commanded.
-        if config.trajectory.sensing == "cameras":
-            cameras = CameraLevelSim(config, config.trajectory)
-            return _in_lockstep(module, config, run, cameras, _CAMERA_LEVEL)
+    ticks_per_frame = ODOMETRY_HZ // config.frame_hz
+    emits = _CAMERA_LEVEL if config.renders else _PERCEPT_LEVEL
 
-        scripted = PerceptLevelSim(
-            config.trajectory, config.noise, config.percepts, config.frame_hz, config.seed
-        )
-        return _in_lockstep(module, config, run, scripted, _PERCEPT_LEVEL)
+    if config.renders:
+        # It needs pybullet, which percept-level drives do not.
+        from cogmap.services.sim import camera_level
 
-    if config.sensing == "percepts":
-        percepts = DrivenPerceptLevelSim(config, battery)
-        module.on(topics.STREET_CLOSURE, percepts.closed_streets.on_closure)
-        module.journaling(topics.TRUE_POSE, percepts.resume, percepts.truth)
-        return _in_lockstep(module, config, run, percepts, _PERCEPT_LEVEL)
+        if trajectory is None:
+            simulation = camera_level.driven(config, battery, ticks_per_frame)
+        else:
+            simulation = camera_level.scripted(config, trajectory, ticks_per_frame)
+    elif trajectory is None:
+        simulation = driven(config, battery, ticks_per_frame)
+    else:
+        simulation = scripted(config, trajectory)
 
-    simulation = Simulation(config, battery)
-    module.on(topics.STREET_CLOSURE, simulation.closed_streets.on_closure)
-    module.journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
+    if trajectory is None:
+        module.on(topics.STREET_CLOSURE, simulation.closed_streets.on_closure)
+        module.journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
+
+    # Time begins when these are ready: at least the simulation itself.
+    required = run.participants or {"sim": 1}
     if run.lockstep:
-        return _in_lockstep(module, config, run, simulation, _CAMERA_LEVEL)
+        lockstep = Lockstep(simulation)
+        module.on(topics.MOTOR_COMMAND, lockstep.on_command, emits)
+        module.on_start(lockstep.on_start, required, emits)
+        return module.every(REPEAT_CHECK_NS, lockstep.on_timer, emits)
 
-    real_time = RealTime(simulation, config.command_timeout_s, config.max_command_age_s)
+    real_time = RealTime(simulation)
     module.on(topics.MOTOR_COMMAND, real_time.on_command)
-    module.on_start(real_time.on_start, _required(run))
-    return module.every(simulation.tick_ns, real_time.on_timer, _CAMERA_LEVEL)
+    module.on_start(real_time.on_start, required)
+    return module.every(simulation.tick_ns, real_time.on_timer, emits)
 
 
-def _in_lockstep(
-    module: Module,
-    config: Config,
-    run: Run,
-    simulation: SteppedSim,
-    emits: tuple[topics.Topic, ...],
-) -> Module:
-    lockstep = Lockstep(simulation, config.repeat_after_s)
-    module.on(topics.MOTOR_COMMAND, lockstep.on_command, emits)
-    module.on_start(lockstep.on_start, _required(run), emits)
-    return module.every(REPEAT_CHECK_NS, lockstep.on_timer, emits)
+def driven(config: Config, battery: Battery | None, ticks_per_frame: int) -> Simulation:
+    """Return a robot that drives itself through the town that is configured, without physics."""
+    place = place_of(config, battery)
+    surroundings = Surroundings(place)
+    robot = KinematicRobot(place.start, surroundings, config.noise, config.seed)
+    mount = calibration(config.width_px, config.height_px)
+    sensors = TownSensors(place, surroundings, config.percepts, mount, config.seed)
+    senses = PerceptSenses(sensors, config.percepts, config.seed)
+    return Simulation(
+        config, robot, senses, place=place, battery=battery, ticks_per_frame=ticks_per_frame
+    )
 
 
-def _required(run: Run) -> dict[str, int]:
-    """The modules that must be ready before time begins: at least the simulation itself."""
-    return run.participants or {"sim": 1}
+def scripted(config: Config, trajectory: Trajectory) -> Simulation:
+    """Return a robot that follows `trajectory`, a view each tick."""
+    follower = LineFollower(trajectory, config.noise, config.seed)
+    sensors = LineSensors(trajectory, follower, config.percepts, config.seed)
+    return Simulation(config, follower, PerceptSenses(sensors, config.percepts, config.seed))

@@ -75,9 +75,15 @@ class Robot:
         wheel = self._sphere(WHEEL_RADIUS_M)
         caster = self._sphere(_CASTER_RADIUS_M)
         caster_m = _CASTER_RADIUS_M - WHEEL_RADIUS_M + 0.002
+        trunk = pybullet.createCollisionShape(
+            pybullet.GEOM_BOX,
+            halfExtents=[0.5, 0.3, 0.1],
+            collisionFramePosition=[0, 0, 0.08],
+            physicsClientId=client,
+        )
         body = pybullet.createMultiBody(
             _MASS_KG,
-            self._trunk(),
+            trunk,
             -1,
             linkMasses=[_WHEEL_KG, _WHEEL_KG, _CASTER_KG, _CASTER_KG],
             linkCollisionShapeIndices=[wheel, wheel, caster, caster],
@@ -104,16 +110,6 @@ class Robot:
             pybullet.changeDynamics(body, link, lateralFriction=friction, physicsClientId=client)
 
         return int(body)
-
-    def _trunk(self) -> int:
-        return int(
-            pybullet.createCollisionShape(
-                pybullet.GEOM_BOX,
-                halfExtents=[0.5, 0.3, 0.1],
-                collisionFramePosition=[0, 0, 0.08],
-                physicsClientId=self._client,
-            )
-        )
 
     def _sphere(self, radius_m: float) -> int:
         return int(

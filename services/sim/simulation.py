@@ -1,51 +1,112 @@
-"""The world and the sensors in it, tick by tick of the odometry."""
+"""The simulation, tick by tick: a driver moves the robot, and senses publish what it measures."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
+from typing import Protocol
 
 import msgspec
 
-from cogmap.robot import calibration
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock
-from cogmap.schemas.sensing import MotorCommand, Odometry, StereoFrame, TruePose, TrueTown
+from cogmap.schemas.sensing import MotorCommand, Pose, SpeedLimit, TruePose, TrueTown
 from cogmap.services.sim.battery import Battery, PowerSupply
-from cogmap.services.sim.config import Config, place_of
+from cogmap.services.sim.config import Config
 from cogmap.services.sim.layout.closures import ClosedStreets
-from cogmap.services.sim.layout.town import Town
-from cogmap.services.sim.odometry import WheelOdometry
-from cogmap.services.sim.progress import Progress
-from cogmap.services.sim.rendering.camera import StereoCamera
-from cogmap.services.sim.world import World
+from cogmap.services.sim.layout.place import Place
+from cogmap.services.sim.layout.removals import RemovedBuildings
+from cogmap.services.sim.odometry import Motion
+
+
+class Driver(Protocol):
+    """Moves the robot: by physics, by kinematics alone, or along a line."""
+
+    @property
+    def pose(self) -> Pose:
+        """The true pose: the middle of the axle, and the heading."""
+
+    @property
+    def travelled_m(self) -> float:
+        """The distance that it has travelled."""
+
+    @property
+    def collisions(self) -> int:
+        """How often it ran into something."""
+
+    @property
+    def course_share(self) -> float | None:
+        """How much of its course is travelled; None without one."""
+
+    def drive(self, command: MotorCommand) -> None:
+        """Obey a command from now on."""
+
+    def brake(self) -> None:
+        """Stop the wheels."""
+
+    def resume(self, last: TruePose) -> None:
+        """Continue at the last true pose, at rest."""
+
+    def advance(self, dt_s: float) -> list[Motion]:
+        """Move for `dt_s`, and return the self-motion that the wheels measure."""
+
+
+class Senses(Protocol):
+    """Publishes what the robot measures of a place, by cameras or as percepts."""
+
+    def on_motion(self, motions: list[Motion], since_ns: int, stamp_ns: int) -> list[Message]:
+        """Take account of the self-motion of a tick; return what is published at once."""
+
+    def view(self, pose: Pose, stamp_ns: int, frame: int, energy: list[Message]) -> list[Message]:
+        """Return what is published of a view, with the energy that is sensed in it."""
+
+    def change(self, closed: frozenset[str], gone: frozenset[int]) -> None:
+        """Let these streets be closed and these buildings be gone, and no others."""
+
+    def town(self, closed: Collection[str], gone: Collection[int]) -> TrueTown:
+        """Return the place as it is then."""
 
 
 class Simulation:
-    """A town with a robot. Simulated time starts at 0 and advances by `tick_ns` with every tick."""
+    """Simulated time starts at 0 and advances by `tick_ns` with every step, `ticks_per_frame` of
+    them between two views.
 
-    def __init__(self, config: Config, battery: Battery | None = None) -> None:
-        self.config = config
-        self.tick_ns = 1_000_000_000 // config.odometry_hz
-        self.ticks_per_frame = config.odometry_hz // config.frame_hz
+    Without a `place` there is nothing in it that changes, and nothing to be charged at.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        driver: Driver,
+        senses: Senses,
+        *,
+        place: Place | None = None,
+        battery: Battery | None = None,
+        ticks_per_frame: int = 1,
+    ) -> None:
+        self.ticks_per_frame = ticks_per_frame
+        self.tick_ns = 1_000_000_000 // (config.frame_hz * ticks_per_frame)
         self.now_ns = 0
         self.progress = 0.0
+        self.driver = driver
+        self.senses = senses
 
-        place = place_of(config, battery)
-        self.closed_streets = ClosedStreets(place.roads, config.closures)
-        self.world = World(place, config.egl, whole=isinstance(place, Town))
-        mount = calibration(config.width_px, config.height_px)
-        self.camera = StereoCamera(self.world, mount)
+        self.closed_streets = ClosedStreets((), ())
+        self._removed = RemovedBuildings(0, ())
+        self._power = PowerSupply(None, ())
+        if place is not None:
+            self.closed_streets = ClosedStreets(place.roads, config.closures)
+            self._removed = RemovedBuildings(len(place.plots), config.removals)
+            self._power = PowerSupply(battery, place.charging_places_m)
 
-        self._odometry = WheelOdometry(config.noise, config.seed)
-        self._power = PowerSupply(battery, place.charging_places_m)
-        self._progress = Progress(config.duration_s, config.ends_at_goal)
-        self._pose = self.world.pose()
-        self._travelled_m = 0.0
+        self._duration_ns = config.duration_s * 1e9
+        self._ends_at_goal = config.ends_at_goal
+        self._is_over = False
         self._frames = 0
 
     def resume(self, past: Iterable[Message]) -> None:
-        """Continue at the time and the place of the last true pose, at rest."""
+        """Continue at the time and the place of the last true pose, at rest; what was over stays
+        over.
+        """
         last: Message | None = None
         for message in past:
             last = message
@@ -53,89 +114,81 @@ class Simulation:
         if not isinstance(last, TruePose):
             return
 
-        self.world.robot.place(last.pose)
-        self._pose = self.world.pose()
-        self._travelled_m = last.travelled_m
-        self.world.collisions = last.collisions
-        self._progress.resume(last.progress)
+        self.driver.resume(last)
+        self._is_over = last.progress >= 1.0
         self._power.resume(last.energy)
         self.now_ns = last.stamp_ns
         self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
 
     def drive(self, command: MotorCommand) -> None:
-        """Set the wheels' speeds, where there is energy."""
-        self._progress.on_command(command)
-        if self._power.is_out:
-            return
-
-        self.world.robot.drive(command.left_wheel_rad_s, command.right_wheel_rad_s)
+        """Set the wheels' speeds if there is energy. A drive that ends at its goal is over once a
+        command halts the robot there.
+        """
+        if self._ends_at_goal and command.halted_by is SpeedLimit.AT_GOAL:
+            self._is_over = True
+        if not self._power.is_out:
+            self.driver.drive(command)
 
     def brake(self) -> None:
         """Stop the wheels."""
-        self.world.robot.drive(0.0, 0.0)
-
-    def tick(self) -> Odometry:
-        """Advance by one tick: the wheels' measurement of it."""
-        before = self._pose
-        dt_s = self.tick_ns / 1e9
-
-        self.world.step(dt_s)
-        self.now_ns += self.tick_ns
-        self._pose = self.world.pose()
-
-        dx_m = self._pose.x_m - before.x_m
-        dy_m = self._pose.y_m - before.y_m
-        moved_m = math.sqrt(dx_m**2 + dy_m**2)
-        self._travelled_m += moved_m
-
-        self._power.advance(self._pose, moved_m, dt_s)
-        if self._power.is_out:
-            self.brake()
-
-        odometry = self._odometry.measure(before, self._pose, dt_s)
-        return msgspec.structs.replace(odometry, stamp_ns=self.now_ns)
+        self.driver.brake()
 
     def step(self) -> list[Message]:
-        """As `tick`, in a list."""
-        return [self.tick()]
+        """Advance by one tick; return what is measured meanwhile and published at once."""
+        dt_s = self.tick_ns / 1e9
+        since_ns = self.now_ns
+        before_m = self.driver.travelled_m
+        motions = self.driver.advance(dt_s)
+        self.now_ns += self.tick_ns
+
+        self._power.advance(self.driver.pose, self.driver.travelled_m - before_m, dt_s)
+        if self._power.is_out:
+            self.driver.brake()
+
+        return self.senses.on_motion(motions, since_ns, self.now_ns)
 
     def view(self) -> list[Message]:
-        """As `frame`, and the energy that is sensed with it."""
-        frame = self.frame()
-        return [frame, *self._power.sensed(frame.stamp_ns, frame.frame)]
-
-    def frame(self) -> StereoFrame:
-        """The next stereo frame."""
-        number = self._frames
+        """Return the next view."""
+        frame = self._frames
         self._frames += 1
-        return self.camera.frame(self.now_ns, number)
+        energy = self._power.sensed(self.now_ns, frame)
+        return self.senses.view(self.driver.pose, self.now_ns, frame, energy)
 
     def clock(self, rate: float) -> Clock:
-        """The simulated time, which passes at `rate` times the wall's."""
+        """Return the simulated time, which passes at `rate` times the wall's."""
         return Clock(stamp_ns=self.now_ns, rate=rate)
 
     def truth(self) -> TruePose:
-        """The robot's true pose."""
-        self.progress = self._progress.at(self.now_ns)
+        """Return the robot's true pose. Progress is the share of its course that it has travelled,
+        and without a course the share of the drive's duration.
+        """
+        share = self.driver.course_share
+        if share is None:
+            share = 1.0 if self._is_over else min(1.0, self.now_ns / self._duration_ns)
+        self.progress = share
 
         return TruePose(
             stamp_ns=self.now_ns,
-            pose=self._pose,
-            travelled_m=self._travelled_m,
-            progress=self.progress,
-            collisions=self.world.collisions,
+            pose=self.driver.pose,
+            travelled_m=self.driver.travelled_m,
+            progress=share,
+            collisions=self.driver.collisions,
             energy=self._power.level,
         )
 
-    def changed_town(self) -> TrueTown | None:
-        """The town, where a street was closed or opened since the last call."""
-        if not self.closed_streets.advance(self.now_ns):
-            return None
-
-        self.world.close_streets(self.closed_streets.names)
-        return self.town()
-
     def town(self) -> TrueTown:
-        """The town as it is now."""
-        town = self.world.town.message(self.closed_streets.names)
+        """Return the town as it is now."""
+        town = self.senses.town(self.closed_streets.names, self._removed.numbers)
         return msgspec.structs.replace(town, stamp_ns=self.now_ns)
+
+    def changed_town(self) -> list[Message]:
+        """Return the town, if a street was closed or opened, or a building torn down, since the
+        last call.
+        """
+        has_streets_changed = self.closed_streets.advance(self.now_ns)
+        has_lost_buildings = self._removed.advance(self.now_ns)
+        if not has_streets_changed and not has_lost_buildings:
+            return []
+
+        self.senses.change(self.closed_streets.names, self._removed.numbers)
+        return [self.town()]

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from cogmap.errors import UsageError
+from cogmap.services.sim.config import NEEDS_PYBULLET
 
 
 @contextmanager
@@ -32,9 +33,6 @@ try:
     with quiet():  # pybullet greets on standard error while it is imported
         import pybullet
 except ModuleNotFoundError:
-    raise UsageError(
-        "rendering needs pybullet, which has wheels for Python 3.11 on Linux x86-64 only: "
-        "`pip install 'cogmap[rendering]'` there, or use the container; everything else runs here"
-    ) from None
+    raise UsageError(NEEDS_PYBULLET) from None
 
 __all__ = ["pybullet", "quiet"]

@@ -12,7 +12,6 @@ import numpy as np
 
 from cogmap.geometry.arrays import Singles
 from cogmap.schemas.sensing import Pose
-from cogmap.services.sim.config import STEP_S
 from cogmap.services.sim.layout.barriers import barriers
 from cogmap.services.sim.layout.furniture import Prop
 from cogmap.services.sim.layout.place import Place
@@ -26,6 +25,9 @@ from cogmap.services.sim.scene.bodies import Bodies
 from cogmap.services.sim.scene.builder import Builder
 from cogmap.services.sim.scene.nearby import Nearby, Piece
 from cogmap.services.sim.stdio import pybullet, quiet
+
+STEP_S = 1 / 240
+"""A step of the physics, pybullet's own."""
 
 _GRAVITY_M_S2 = -9.81
 _CONTACT_BODY = 2
@@ -76,9 +78,20 @@ class World:
         for _ in range(steps):
             pybullet.stepSimulation(physicsClientId=self.client)
 
-        self._count_collisions()
+        # A collision begins when the robot touches something that stands on the ground; it may
+        # bounce there.
+        contacts = pybullet.getContactPoints(self.robot.body, physicsClientId=self.client)
+        touched = {contact[_CONTACT_BODY] for contact in contacts or ()}
+        is_touching = not self._solid.isdisjoint(touched)
+        pose = self.robot.pose()
+        here_m = (pose.x_m, pose.y_m)
+        if self._touched_m is None:
+            self.collisions += is_touching
+            self._touched_m = here_m if is_touching else None
+        elif not is_touching and math.dist(self._touched_m, here_m) > _RELEASED_M:
+            self._touched_m = None
+
         if self._nearby is not None:
-            pose = self.robot.pose()
             self._follow(pose.x_m, pose.y_m)
 
     def pose(self) -> Pose:
@@ -106,24 +119,6 @@ class World:
     def close(self) -> None:
         """Leave pybullet; nothing of it stays."""
         self._leave()
-
-    def _count_collisions(self) -> None:
-        """Count when the robot begins to touch something that stands on the ground; it may bounce
-        there.
-        """
-        contacts = pybullet.getContactPoints(self.robot.body, physicsClientId=self.client)
-        touched = {contact[_CONTACT_BODY] for contact in contacts or ()}
-        is_touching = not self._solid.isdisjoint(touched)
-        pose = self.robot.pose()
-        here_m = (pose.x_m, pose.y_m)
-        if is_touching and self._touched_m is None:
-            self.collisions += 1
-            self._touched_m = here_m
-
-        if self._touched_m is None or is_touching:
-            return
-        if math.dist(self._touched_m, here_m) > _RELEASED_M:
-            self._touched_m = None
 
     def _follow(self, x_m: float, y_m: float) -> None:
         """Let the ground, the sky and what is near follow the robot."""

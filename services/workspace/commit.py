@@ -84,7 +84,12 @@ class Ledger:
         for proposal in proposals:
             try:
                 columns = self.check(proposal)
-                _check_apart(proposal, columns & written)
+                shared = columns & written
+                if shared:
+                    column = _in_words(min(shared, key=str))
+                    raise MessageError(
+                        f"proposal {proposal.task_id}: {column} is written by another in this phase"
+                    )
             except MessageError as error:
                 self.reject(str(error))
             else:
@@ -161,15 +166,6 @@ def coalitions_of(context: CycleContext, proposals: list[Proposal]) -> Coalition
             name = f"{proposal.task_id}/{number}"
             found.append(msgspec.structs.replace(coalition, id=name))
     return Coalitions(stamp_ns=context.stamp_ns, cycle=context.cycle, coalitions=found)
-
-
-def _check_apart(proposal: Proposal, shared: set[Key]) -> None:
-    """Raise MessageError where a proposal writes columns of tiles that another one writes too."""
-    if shared:
-        first = min(shared, key=str)
-        raise MessageError(
-            f"proposal {proposal.task_id}: {_in_words(first)} is written by another in this phase"
-        )
 
 
 def _frames_of(operation: Operation) -> list[Key]:

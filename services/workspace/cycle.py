@@ -18,8 +18,10 @@ from cogmap.schemas.process import Clock, Presence
 from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
 from cogmap.services.workspace.commit import Ledger, coalitions_of
 from cogmap.services.workspace.config import Config
-from cogmap.services.workspace.dispatch import Dispatch
-from cogmap.services.workspace.entrance import (
+from cogmap.services.workspace.dispatch import MAX_ATTEMPTS, Dispatch
+from cogmap.services.workspace.forgetting import Forgetting
+from cogmap.services.workspace.individuals import as_entered, individuals
+from cogmap.services.workspace.ingress import (
     check_percepts,
     expected_operations,
     first_goals,
@@ -27,13 +29,11 @@ from cogmap.services.workspace.entrance import (
     percept_operations,
     recognised,
 )
-from cogmap.services.workspace.forgetting import Forgetting
-from cogmap.services.workspace.individuals import as_entered, individuals
 from cogmap.services.workspace.lane import Lanes
 from cogmap.services.workspace.learning.base_level import learned_operations
 from cogmap.services.workspace.learning.consciousness import Consciousness
 from cogmap.services.workspace.offers import Offers
-from cogmap.services.workspace.sensed import Sensed
+from cogmap.services.workspace.senses import Sensed
 
 WORKERS = "codelets"
 COMPETITION = "global_workspace"
@@ -63,13 +63,13 @@ class Workspace:
         self._ledger = Ledger(writers)
         self._lanes = Lanes(codelets, config, run)
         lease_ns = int(config.lease_ms * 1e6)
-        self._dispatch = Dispatch(lease_ns, config.attempts, self._lanes.dispatches)
+        self._dispatch = Dispatch(lease_ns, self._lanes.dispatches)
         self._forgetting = Forgetting()
         offering = [name for name in OFFERING if run.has_any(name)]
         self._offers = Offers(offering if run.lockstep else ())
         self._consciousness = Consciousness(run.lockstep and run.has_any(COMPETITION))
 
-        self._sensed = Sensed(config, run)
+        self._sensed = Sensed(run)
         self._waiting: Percepts | None = None
         self._is_repeated = False
         self._context: CycleContext | None = None
@@ -161,8 +161,21 @@ class Workspace:
 
         if proposal.task_id not in self._late:
             return []
+
         del self._late[proposal.task_id]
-        return self._commit_late(proposal)
+        if not self._ledger.validate([proposal]):
+            return []
+        if proposal.coalitions:
+            # Its codelet would keep that it has brought them.
+            self._ledger.reject(f"the coalitions of {proposal.task_id} came after its cycle")
+            return []
+
+        graph = self._ledger.graph
+        delta = self._ledger.commit(
+            proposal.stamp_ns, graph.cycle, Phase.LATE, proposal.operations, [proposal.task_id]
+        )
+        self._forgetting.note(delta, graph)
+        return [delta, *proposal.events]
 
     def on_presence(self, presence: Presence) -> list[Message]:
         """A worker came or went; the cycle continues without a task that has failed."""
@@ -231,35 +244,24 @@ class Workspace:
         if not self._sensed.is_complete(percepts.stamp_ns, self._moved_until_ns):
             return []
 
+        graph = self._ledger.graph
         if self._is_interrupted(percepts):
-            return self._continue_interrupted(percepts)
+            self._waiting = None
+            motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
+            entered = as_entered(recognised(percepts), graph)
+            self._context = self._sensed.context(entered, motions, graph.cycle, graph.version)
+            self._phase = PLACE_OF.get(graph.phase, -1)
+            return self._next_phase()
 
-        ended = self._end_interrupted()
-        cycle = self._ledger.graph.cycle
+        # A cycle that a kill interrupted, and whose view will not come again, ends.
+        ended: list[Message] = []
+        if graph.phase is not Phase.END:
+            ended = [self._ledger.commit(max(0, self._begun_ns), graph.cycle, Phase.END, [])]
+        cycle = graph.cycle
         is_known = self._is_repeated or self._consciousness.complete(cycle)
         if not is_known or not self._offers.complete(cycle):
             return ended
         return [*ended, *self._begin_cycle(percepts)]
-
-    def _certain(self, percepts: Percepts) -> Percepts:
-        return recognised(percepts, self._config.recognition_threshold)
-
-    def _continue_interrupted(self, percepts: Percepts) -> list[Message]:
-        graph = self._ledger.graph
-        self._waiting = None
-        motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
-        entered = as_entered(self._certain(percepts), graph)
-        self._context = self._sensed.context(entered, motions, graph.cycle, graph.version)
-
-        self._phase = PLACE_OF.get(graph.phase, -1)
-        return self._next_phase()
-
-    def _end_interrupted(self) -> list[Message]:
-        """End a cycle that a kill interrupted, whose view will not come again."""
-        graph = self._ledger.graph
-        if graph.phase is Phase.END:
-            return []
-        return [self._ledger.commit(max(0, self._begun_ns), graph.cycle, Phase.END, [])]
 
     def _begin_cycle(self, percepts: Percepts) -> list[Message]:
         graph = self._ledger.graph
@@ -267,17 +269,17 @@ class Workspace:
         before_ns = self._begun_ns
         self._begun_ns = percepts.stamp_ns
         motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
-        entered = individuals(self._certain(percepts), graph, motions)
+        entered = individuals(recognised(percepts), graph, motions)
         self._context = self._sensed.context(entered, motions, graph.cycle + 1, graph.version)
         self._phase = -1
         self._is_repeated = False
 
         entering = first_operations(graph, self._config)
         conscious = self._consciousness.take(graph.cycle)
-        entering += learned_operations(conscious, graph, self._context.cycle, self._config)
+        entering += learned_operations(conscious, graph, self._context.cycle)
         entering += first_goals(self._config, before_ns, self._begun_ns)
         entering += percept_operations(graph, self._context)
-        entering = expected_operations(graph, percepts, entering, self._context.cycle, self._config)
+        entering = expected_operations(graph, percepts, entering, self._context.cycle)
         entering += self._sensed.needs(percepts.stamp_ns, self._context.cycle)
         entering += self._offers.take(self._ledger, entering, self._context.cycle)
         return [self._commit(Phase.PERCEPTS, entering), *self._next_phase()]
@@ -357,23 +359,6 @@ class Workspace:
             published += proposal.events
         return published
 
-    def _commit_late(self, proposal: Proposal) -> list[Message]:
-        """Commit an answer that came after its cycle; none that brings coalitions, which are too
-        late, as its codelet would keep that it has brought them.
-        """
-        if not self._ledger.validate([proposal]):
-            return []
-        if proposal.coalitions:
-            self._ledger.reject(f"the coalitions of {proposal.task_id} came after its cycle")
-            return []
-
-        graph = self._ledger.graph
-        delta = self._ledger.commit(
-            proposal.stamp_ns, graph.cycle, Phase.LATE, proposal.operations, [proposal.task_id]
-        )
-        self._forgetting.note(delta, graph)
-        return [delta, *proposal.events]
-
     def _end(self) -> list[Message]:
         """Commit what lanes have answered, forget what has decayed, and begin the next cycle."""
         context = self._context
@@ -391,6 +376,7 @@ class Workspace:
         return [*published, *self._begin()]
 
     def _reject_failed(self, tasks: list[str]) -> None:
-        attempts = self._config.attempts
         for name in tasks:
-            self._ledger.reject(f"task {name} was given to {attempts} workers and lost each time")
+            self._ledger.reject(
+                f"task {name} was given to {MAX_ATTEMPTS} workers and lost each time"
+            )

@@ -12,6 +12,8 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
 
 BUSY = 1000
+MAX_ATTEMPTS = 5
+"""Workers that a task is given to before it has failed: one that kills each must end."""
 
 
 @dataclass
@@ -35,18 +37,14 @@ class Lease:
 
 
 class Dispatch:
-    """Gives each task to the least loaded worker; to one that has lost it, only where there is no
-    other.
+    """Gives each task to the least loaded worker; to one that lost it only if there is no other.
 
     The same workers and tasks give the same choice. Workers that hold a task of one of the
     dispatches in `background` count as busy.
     """
 
-    def __init__(
-        self, lease_ns: int, attempts: int, background: Callable[[], list[Dispatch]] = list
-    ) -> None:
+    def __init__(self, lease_ns: int, background: Callable[[], list[Dispatch]] = list) -> None:
         self._lease_ns = lease_ns
-        self._attempts = attempts
         self._background = background
         self._workers: set[str] = set()
         self._leases: dict[str, Lease] = {}
@@ -138,15 +136,15 @@ class Dispatch:
 
     def load(self) -> Counter[str]:
         """How many open tasks each worker holds."""
-        return Counter(lease.worker for lease in self._held())
+        return Counter(lease.worker for lease in self.held())
 
-    def _held(self) -> list[Lease]:
+    def held(self) -> list[Lease]:
         """The open tasks that workers hold."""
         return [lease for lease in self._leases.values() if lease.is_open and lease.worker]
 
     def _has_failed(self, lease: Lease) -> bool:
         is_waiting = lease.is_open and not lease.worker
-        return is_waiting and lease.attempt >= self._attempts
+        return is_waiting and lease.attempt >= MAX_ATTEMPTS
 
     def _revoke(self, is_lost: Callable[[Lease], bool]) -> None:
         for lease in self._leases.values():
@@ -163,7 +161,14 @@ class Dispatch:
         if not self._workers:
             return []
 
-        load = self._load_with_background()
+        # A background task counts as BUSY others: the youngest once, each older one once more, for
+        # it may well take longer.
+        load = self.load()
+        held = [lease for other in self._background() for lease in other.held()]
+        held.sort(key=lambda lease: -lease.task.cycle)
+        for rank, lease in enumerate(held, start=1):
+            load[lease.worker] += BUSY * rank
+
         tasks: list[Task] = []
         assignments: list[Assignment] = []
         for lease in self._leases.values():
@@ -171,42 +176,21 @@ class Dispatch:
             if not is_waiting or self._has_failed(lease):
                 continue
 
-            worker = self._least_loaded(load, lease.lost_by)
+            lost_by = lease.lost_by
+            worker = min(self._workers, key=lambda name: (name == lost_by, load[name], name))
             load[worker] += 1
             lease.worker = worker
             lease.until_ns = now_ns + self._lease_ns
             tasks.append(lease.task)
-            assignments.append(_assignment(lease))
+            assignment = Assignment(
+                task_id=lease.task.task_id,
+                worker=worker,
+                attempt=lease.attempt,
+                version=lease.task.version,
+            )
+            assignments.append(assignment)
 
         if not tasks:
             return []
         stamp_ns = max(task.stamp_ns for task in tasks)
         return [Leases(stamp_ns=stamp_ns, assignments=assignments), *tasks]
-
-    def _load_with_background(self) -> Counter[str]:
-        """How loaded each worker is, where a background task counts as BUSY others: the youngest
-        once, each older one once more, for it may well take longer.
-        """
-        load = self.load()
-        held = [lease for other in self._background() for lease in other._held()]
-        held.sort(key=lambda lease: -lease.task.cycle)
-        for rank, lease in enumerate(held, start=1):
-            load[lease.worker] += BUSY * rank
-
-        return load
-
-    def _least_loaded(self, load: Counter[str], lost_by: str) -> str:
-        def rank(name: str) -> tuple[bool, int, str]:
-            has_lost_it = name == lost_by
-            return has_lost_it, load[name], name
-
-        return min(self._workers, key=rank)
-
-
-def _assignment(lease: Lease) -> Assignment:
-    return Assignment(
-        task_id=lease.task.task_id,
-        worker=lease.worker,
-        attempt=lease.attempt,
-        version=lease.task.version,
-    )

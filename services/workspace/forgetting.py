@@ -43,7 +43,12 @@ class Forgetting:
         """The nodes to be forgotten at the end of the current cycle, by id."""
         forgotten = []
         for cycle in range(self._newest + 1, graph.cycle + 1):
-            for node in self._take(cycle, graph):
+            for name in self._buckets.pop(cycle, {}):
+                self._bucket_of.pop(name, None)
+                node = graph.nodes.get(name)
+                if node is None:
+                    continue
+
                 if decay.cycle_of_forgetting(node, graph.decay) <= graph.cycle:
                     forgotten.append(node.id)
                 else:
@@ -51,17 +56,6 @@ class Forgetting:
 
         self._newest = max(self._newest, graph.cycle)
         return [DropNode(id=name) for name in sorted(forgotten)]
-
-    def _take(self, cycle: int, graph: Graph) -> list[GraphNode]:
-        """Empty the bucket of `cycle`; its nodes that the graph still has."""
-        nodes: list[GraphNode] = []
-        for name in self._buckets.pop(cycle, {}):
-            self._bucket_of.pop(name, None)
-            node = graph.nodes.get(name)
-            if node is not None:
-                nodes.append(node)
-
-        return nodes
 
     def _put(self, node: GraphNode, graph: Graph) -> None:
         end_cycle = decay.cycle_of_forgetting(node, graph.decay)

@@ -1,16 +1,16 @@
-"""Of which individual object each percept is a sighting.
+"""Decides of which individual object each percept is a sighting.
 
-Perception recognises what an object looks like, and buildings may look alike. A percept far from
-every object of its name is of another one, while something else in view confirms where the agent
-is, or nothing has for so long that it cannot be elsewhere: of the one that was seen of late where
-it is, for two cannot stand in one place, or else of a new one. So is one that is near an object of
-its name which was hardly seen yet, and may be a mistake.
+Perception recognises what an object looks like, and buildings may look alike. If it is certain
+where the agent is, a percept far from every object of its name is of another object. That is the
+one that was seen at its place recently, as two objects cannot stand in one place; without such a
+one it is new. The same holds for a percept near an object of its name that was seen fewer than
+ESTABLISHED times, which may itself be a mistake.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from typing import NamedTuple
 
 import msgspec
@@ -25,19 +25,22 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.nodes import NEVER_NS, Object, Self, individual_label, object_id
 from cogmap.schemas.sensing import Percept, Percepts
 
-# Beyond so many standard deviations a percept is of another object.
 GATE = 2.0
-# An object that was seen so often stands where it is.
+"""Beyond so many standard deviations a percept is of another object."""
+
 ESTABLISHED = 3
+"""An object that was seen so often stands where it is."""
+
 MAX_INDIVIDUALS = 64
 NOT_ELSEWHERE_NS = 20_000_000_000
+"""For so long it holds that the agent can be nowhere else; chosen, not tuned."""
 
 
 class Candidate(NamedTuple):
     """The individual nearest to a percept: its label, whether the percept may be of it, and whether
     that is certain, for it was seen often or was given.
 
-    `unused` is a label that no individual has yet, empty where there are too many. The percept is
+    `unused` is a label that no individual has yet, empty if there are too many. The percept is
     seen at (x, y) `seen_m`.
     """
 
@@ -60,7 +63,15 @@ def individuals(percepts: Percepts, graph: Graph, motions: Array) -> Percepts:
     before = np.array([agent.x_m, agent.y_m, agent.heading_rad])
     pose = moved_by(before, np.asarray(motions.numpy(), np.float64))
     candidates = [_candidate(percept, pose, agent, graph) for percept in percepts.objects]
-    is_here = _is_not_elsewhere(agent, percepts.stamp_ns) or _is_confirmed(candidates, agent, graph)
+
+    # It is certain where the agent is: it was found not long ago that it can be nowhere else, or an
+    # object is seen where it stands that stood there before anything did not fit.
+    found_ns = agent.misfits.not_elsewhere_ns
+    is_here = found_ns != NEVER_NS and percepts.stamp_ns - found_ns <= NOT_ELSEWHERE_NS
+    for candidate in candidates:
+        node = graph.get(Object, object_id(candidate.label))
+        if node is not None and candidate.is_near:
+            is_here |= node.created_ns <= agent.misfits.last_fit_ns
 
     taken = {candidate.label for candidate in candidates if candidate.is_near}
     objects = []
@@ -93,30 +104,11 @@ def as_entered(percepts: Percepts, graph: Graph) -> Percepts:
     return msgspec.structs.replace(percepts, objects=objects)
 
 
-def _is_not_elsewhere(agent: Self, stamp_ns: int) -> bool:
-    """Whether it was found not long ago that the agent can be nowhere else on the map."""
-    if agent.misfits.not_elsewhere_ns == NEVER_NS:
-        return False
-    return stamp_ns - agent.misfits.not_elsewhere_ns <= NOT_ELSEWHERE_NS
-
-
-def _is_confirmed(candidates: Iterable[Candidate], agent: Self, graph: Graph) -> bool:
-    """Whether an object is seen where it stands that was so before anything did not fit."""
-    for candidate in candidates:
-        node = graph.get(Object, object_id(candidate.label))
-        if node is None or not candidate.is_near:
-            continue
-        if node.created_ns <= agent.misfits.last_fit_ns:
-            return True
-
-    return False
-
-
 def _standing_there(
     percept: Percept, candidate: Candidate, graph: Graph, others: Collection[str]
 ) -> str:
     """The label of the object that a percept can only be of, by where it is: the nearest that was
-    seen of late, and is not among `others`. Empty where there is none.
+    seen recently, and is not among `others`. Empty if there is none.
     """
     agent = graph.agent
     assert agent is not None

@@ -13,6 +13,9 @@ from cogmap.services.workspace.commit import Ledger
 from cogmap.services.workspace.config import Config
 from cogmap.services.workspace.dispatch import Dispatch
 
+LEASE_NS = 5_000_000_000
+"""In real time, how long a worker may take for a background task."""
+
 
 class Lanes:
     """The lanes of all background codelets."""
@@ -78,8 +81,7 @@ class Lane:
         lanes: Callable[[], list[Dispatch]],
     ) -> None:
         self.codelet = codelet
-        lease_ns = int(config.background_lease_ms * 1e6)
-        self.dispatch = Dispatch(lease_ns, config.attempts, lanes)
+        self.dispatch = Dispatch(LEASE_NS, lanes)
 
         self._is_lockstep = run.lockstep
         self._cycles = config.background_cycles

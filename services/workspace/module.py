@@ -22,9 +22,15 @@ def build(
     run: Run = REAL_TIME,
 ) -> Module:
     """The module `workspace`, the single writer of the graph, which calls `codelets`. Raises
-    ConfigError where two goals have one name.
+    ConfigError if two goals have one name.
     """
-    _check(config)
+    names = [goal.name for goal in config.goals]
+    for name in names:
+        if names.count(name) > 1:
+            raise ConfigError(
+                f"[workspace] goals: two are named {name!r}: give each a name of its own"
+            )
+
     workspace = Workspace(config, codelets, run)
 
     published = (
@@ -55,12 +61,3 @@ def build(
             backfill=[topics.SELF_MOTION, topics.OFFER, topics.COMPETITION, topics.BROADCAST],
         )
     )
-
-
-def _check(config: Config) -> None:
-    names = [goal.name for goal in config.goals]
-    for name in names:
-        if names.count(name) > 1:
-            raise ConfigError(
-                f"[workspace] goals: two are named {name!r}: give each a name of its own"
-            )

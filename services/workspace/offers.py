@@ -64,7 +64,12 @@ class Offers:
             except MessageError as error:
                 ledger.reject(str(error))
             else:
-                operations += [_as_of(operation, cycle) for operation in offer.operations]
+                for operation in offer.operations:
+                    # A node without a cycle is as active now as it states.
+                    if isinstance(operation, GraphNode) and operation.cycle == 0:
+                        operations.append(msgspec.structs.replace(operation, cycle=cycle))
+                    else:
+                        operations.append(operation)
 
         return _with_objects(operations, ledger, entering)
 
@@ -99,10 +104,3 @@ def _with_objects(
         accepted += [operation, Link(source=operation.id, target=place, kind=LinkKind.AT)]
 
     return accepted
-
-
-def _as_of(operation: Operation, cycle: int) -> Operation:
-    """A node whose activation is given without a cycle is as active now as it states."""
-    if isinstance(operation, GraphNode) and operation.cycle == 0:
-        return msgspec.structs.replace(operation, cycle=cycle)
-    return operation

@@ -9,7 +9,6 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.graph.tiles import tiles_of
-from cogmap.schemas.array import Array
 from cogmap.schemas.graph import (
     Cells,
     Decay,
@@ -158,15 +157,8 @@ def _check_cells(name: str, operation: Cells, graph: Graph, writer: Writer) -> N
         raise MessageError(f"{name} may not write the place column {operation.column}")
     _check_map(name, operation.map, graph)
 
-    _check_arrays(name, operation.cells, operation.values)
-    number = operation.cells.shape[0]
-    if number > MAX_CELLS:
-        raise MessageError(f"{name}: {number} cells, at most {MAX_CELLS} are taken at once")
-
-    _check_extent(name, np.asarray(operation.cells.numpy(), np.int64))
-
-
-def _check_arrays(name: str, cells: Array, values: Array) -> None:
+    cells = operation.cells
+    values = operation.values
     number = cells.shape[0] if cells.shape else 0
     cells_fit = cells.shape == (number, 2) and cells.dtype == "<i4"
     values_fit = values.shape == (number,) and values.dtype == "<f4"
@@ -175,16 +167,14 @@ def _check_arrays(name: str, cells: Array, values: Array) -> None:
             f"{name}: cells of shape {cells.shape} with {values.shape} values, or of another dtype"
         )
 
+    if number > MAX_CELLS:
+        raise MessageError(f"{name}: {number} cells, at most {MAX_CELLS} are taken at once")
 
-def _check_extent(name: str, cells: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> None:
-    if not len(cells):
-        return
-
-    farthest = int(np.abs(cells).max())
+    positions = np.asarray(cells.numpy(), np.int64)
+    farthest = int(np.abs(positions).max(initial=0))
     if farthest > FARTHEST_CELL:
         raise MessageError(f"{name}: a cell {farthest} cells away, at most {FARTHEST_CELL}")
 
-    may_be_too_many = len(cells) > MAX_TILES
-    tiles = len(tiles_of(cells)) if may_be_too_many else 0
+    tiles = len(tiles_of(positions)) if number > MAX_TILES else 0
     if tiles > MAX_TILES:
         raise MessageError(f"{name}: cells in {tiles} tiles, at most {MAX_TILES} are taken at once")

@@ -1,17 +1,23 @@
-"""What is sensed beside percepts: self-motion and range scans, kept until a cycle needs them."""
+"""Keeps what is sensed beside percepts until the cycle of its view needs it: self-motion, range
+scans and what the body senses of itself.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from cogmap.errors import MessageError
+from cogmap.runtime.codelet import CycleContext
 from cogmap.runtime.run import Run
 from cogmap.schemas.array import Array
-from cogmap.schemas.sensing import RangeScan, SelfMotion
-from cogmap.services.workspace.config import Config
+from cogmap.schemas.nodes import ENERGY, Need, need_id
+from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
 
 SELF_MOTION_COLUMNS = 5
 MAX_SCANS = 16
+MAX_ENERGIES = 16
+MAX_SCAN_AGE_NS = 100_000_000
+"""In real time, how much older than its view a scan may be: half of the time between two views."""
 SCANNERS = ("sim", "sensory")
 """The modules that publish range scans: of percept-level sensing, and of cameras."""
 
@@ -61,15 +67,15 @@ class Scans:
     """The newest range scans, of which each cycle takes the one of its view.
 
     In lockstep a cycle does not begin before it has come; if no module takes part that publishes
-    scans, none is used. In real time it begins with the newest that is at most `max_scan_age_ms`
+    scans, none is used. In real time it begins with the newest that is at most MAX_SCAN_AGE_NS
     older than its view, or with none.
     """
 
-    def __init__(self, config: Config, run: Run) -> None:
+    def __init__(self, run: Run) -> None:
         has_scanner = run.has_any(*SCANNERS)
         self._awaited = run.lockstep and has_scanner
         self._ignored = run.lockstep and not has_scanner
-        self._max_age_ns = 0 if run.lockstep else int(config.max_scan_age_ms * 1e6)
+        self._max_age_ns = 0 if run.lockstep else MAX_SCAN_AGE_NS
         self._scans: dict[int, RangeScan] = {}
         self._missed_ns = -1
 
@@ -113,3 +119,87 @@ class Scans:
         if newest_ns < 0 or is_too_old:
             return None
         return self._scans[newest_ns]
+
+
+class Body:
+    """The newest of what the body sensed, of which each cycle takes that of its view.
+
+    In lockstep a cycle does not begin before it has come, if the robot has a battery.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._awaited = run.lockstep and run.energy
+        self._sensed: dict[int, Energy] = {}
+
+    def put(self, energy: Energy) -> None:
+        """Keep what was sensed with a view."""
+        self._sensed[energy.stamp_ns] = energy
+        while len(self._sensed) > MAX_ENERGIES:
+            del self._sensed[min(self._sensed)]
+
+    def has(self, stamp_ns: int) -> bool:
+        """Whether the cycle of the view at `stamp_ns` waits for its energy no longer."""
+        return not self._awaited or stamp_ns in self._sensed
+
+    def needs(self, stamp_ns: int, cycle: int) -> list[Need]:
+        """The needs at the view at `stamp_ns`: none of a body that senses none, or only later."""
+        until_view = [known_ns for known_ns in self._sensed if known_ns <= stamp_ns]
+        if not until_view:
+            return []
+
+        energy = self._sensed[max(until_view)]
+        level = 1.0 - energy.level
+        need = Need(
+            id=need_id(ENERGY),
+            label=ENERGY,
+            activation=level,
+            cycle=cycle,
+            level=level,
+            is_eased=energy.is_charging,
+        )
+        return [need]
+
+
+class Sensed:
+    """Self-motion, range scans, and what the body senses of itself. `moved_ns` is the time until
+    when self-motion has moved the self node.
+    """
+
+    def __init__(self, run: Run) -> None:
+        self._motions = SelfMotions()
+        self._scans = Scans(run)
+        self._body = Body(run)
+
+    def put_motion(self, motion: SelfMotion, moved_ns: int) -> None:
+        """Keep self-motion. Raises MessageError where its rows are of another shape or dtype."""
+        self._motions.put(motion, moved_ns)
+
+    def put_scan(self, scan: RangeScan) -> None:
+        """Keep a range scan. Raises MessageError where it is none, or too late."""
+        self._scans.put(scan)
+
+    def put_energy(self, energy: Energy) -> None:
+        """Keep the body's energy."""
+        self._body.put(energy)
+
+    def is_complete(self, stamp_ns: int, moved_ns: int) -> bool:
+        """Whether all that the cycle of the view at `stamp_ns` waits for has come."""
+        has_motion = max(self._motions.newest_ns(), moved_ns) >= stamp_ns
+        return has_motion and self._scans.has(stamp_ns) and self._body.has(stamp_ns)
+
+    def motions(self, stamp_ns: int, moved_ns: int) -> Array:
+        """The motions since the self node was moved last, up to `stamp_ns`."""
+        return self._motions.rows(moved_ns, stamp_ns)
+
+    def needs(self, stamp_ns: int, cycle: int) -> list[Need]:
+        """The body's needs at the view at `stamp_ns`."""
+        return self._body.needs(stamp_ns, cycle)
+
+    def context(self, percepts: Percepts, motions: Array, cycle: int, version: int) -> CycleContext:
+        """All that was sensed for the view of `percepts`, of which the scan is taken now."""
+        scan = self._scans.take(percepts.stamp_ns)
+        return CycleContext(cycle, percepts, motions, version, scan)
+
+    def discard(self, moved_ns: int) -> None:
+        """Discard what has moved the self node."""
+        self._motions.discard(moved_ns)

@@ -24,7 +24,6 @@ SECTIONS: dict[str, dict[str, Any]] = {
     "run": {"lockstep": True, "participants": {"sim": 1}},
     "sim": {
         "frame_hz": 2,
-        "odometry_hz": 2,
         "trajectory": {
             "line_m": [[0.0, 0.0], [20.0, 0.0]],
             "landmarks": [{"name": "bakery", "x_m": 20.0, "y_m": 8.0}],
@@ -34,7 +33,6 @@ SECTIONS: dict[str, dict[str, Any]] = {
 CONFIG = """\
 [sim]
 frame_hz = 2
-odometry_hz = 2
 [sim.trajectory]
 line_m = [[0.0, 0.0], [20.0, 0.0]]
 landmarks = [{ name = "bakery", x_m = 20.0, y_m = 8.0 }]

@@ -43,7 +43,7 @@ def test_two_lockstep_drives_of_one_seed_publish_the_same_bytes(
 def test_the_agent_reaches_its_goals_in_lockstep_though_processes_are_killed(
     killed: tuple[str, ...], start: Callable[..., Run]
 ) -> None:
-    run = start("--lockstep", "--laps", "0.2", "--set", "sim.repeat_after_s=3")
+    run = start("--lockstep", "--laps", "0.2")
     run.wait_for(DRIVING)
 
     run.kill(*killed)

@@ -43,7 +43,6 @@ REFERENCE = Path(__file__).parents[1] / "replay" / "reference.mcap"
 FRAMES = 10
 SMALL: Sections = {
     "sim": {"width_px": 96, "height_px": 72, "egl": False},
-    "workspace": {"first_samples": 40},
     "codelets": {"samples": 100, "kept_samples": 40, "landmark_samples": 40},
 }
 COMPARED = [topic for topic in topics.ALL if topic.scope is not Scope.PROCESS]

@@ -54,6 +54,15 @@ def coalition(
                 look=look, range_m=percept.range_m, bearing_rad=percept.bearing_rad
             )
 
+    # The maps that nodes are on, and the sub-maps that they are in, each once.
+    maps: dict[str, None] = {}
+    for node in nodes:
+        if isinstance(node, Self | Object | Goal | Plan):
+            maps[node.map] = None
+        sub_map = graph.links.target(node.id, LinkKind.WITHIN)
+        if sub_map is not None:
+            maps[sub_map] = None
+
     number = len(nodes) + len(every_link)
     activation = total / (2 * number)
     return Coalition(
@@ -61,7 +70,7 @@ def coalition(
         activation=min(1.0, activation),
         nodes=[_as_of_now(node, graph) for node in nodes],
         links=every_link,
-        maps=_maps_of(nodes, graph),
+        maps=list(maps),
         relations=relations,
         feeling=feeling,
     )
@@ -83,21 +92,6 @@ def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
         objects.append(msgspec.structs.replace(node, salience=salience))
 
     return objects
-
-
-def _maps_of(nodes: list[AnyNode], graph: Graph) -> list[str]:
-    """The maps that nodes are on, and the sub-maps that they are in, each once, in the order of the
-    nodes.
-    """
-    maps: dict[str, None] = {}
-    for node in nodes:
-        if isinstance(node, Self | Object | Goal | Plan):
-            maps[node.map] = None
-        sub_map = graph.links.target(node.id, LinkKind.WITHIN)
-        if sub_map is not None:
-            maps[sub_map] = None
-
-    return list(maps)
 
 
 def _as_of_now(node: AnyNode, graph: Graph) -> AnyNode:

@@ -37,7 +37,18 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
     has that `pose`. One that is known here keeps its label; others get one that is free.
     """
     known = [node for node in graph.of_kind(Object) if node.map == ROOT_MAP]
-    labels = _labels(recalled, known, pose)
+    positions_m = np.array([(node.x_m, node.y_m) for node in known]).reshape(-1, 2)
+    here_m = transform_from(pose, positions_m).tolist()
+
+    # The label here of each: the one it is matched with, or that of the object of its look that
+    # stands there too; empty if there is none.
+    matched = {label for label in recalled.matched if label}
+    labels = []
+    for number, match in enumerate(recalled.matched):
+        label = match or _standing_there(recalled, number, known, here_m, matched)
+        matched.add(label)
+        labels.append(label)
+
     node_of = {node.label: node for node in known}
     taken = set(node_of) | {label for label in labels if label}
 
@@ -74,23 +85,6 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
         operations += [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
 
     return operations
-
-
-def _labels(recalled: Recollection, known: list[Object], pose: Floats) -> list[str]:
-    """The label here of each recalled object: the one it is matched with, or that of the object of
-    its look that stands there too; empty if there is none.
-    """
-    positions_m = np.array([(node.x_m, node.y_m) for node in known]).reshape(-1, 2)
-    here_m = transform_from(pose, positions_m).tolist()
-    taken = {label for label in recalled.matched if label}
-
-    labels = []
-    for number, matched in enumerate(recalled.matched):
-        label = matched or _standing_there(recalled, number, known, here_m, taken)
-        taken.add(label)
-        labels.append(label)
-
-    return labels
 
 
 def _standing_there(

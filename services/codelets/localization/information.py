@@ -55,8 +55,13 @@ def variances_at(path: Sequence[PathSegment], stamp_ns: int) -> tuple[float, flo
     """Path integration's variances, in m^2 and rad^2, at the place of a `path`, its oldest segment
     first, at `stamp_ns`, or the next before it; -inf each before the path begins.
     """
+
+    def begin_s(segment: PathSegment) -> float:
+        # Without decoding the rows, which is most of a search's time.
+        return float(STAMP_FORMAT.unpack_from(segment.rows.data, STAMP_OFFSET)[0])
+
     stamp_s = stamp_ns * 1e-9
-    index = bisect_right(path, stamp_s, key=_begin_s) - 1
+    index = bisect_right(path, stamp_s, key=begin_s) - 1
     if index < 0:
         return -math.inf, -math.inf
 
@@ -64,11 +69,3 @@ def variances_at(path: Sequence[PathSegment], stamp_ns: int) -> tuple[float, flo
     following = int(rows[:, PathColumn.STAMP_S].searchsorted(stamp_s, side="right"))
     variance_m2, variance_rad2 = rows[following - 1, VARIANCES].tolist()
     return variance_m2, variance_rad2
-
-
-def _begin_s(segment: PathSegment) -> float:
-    """The stamp of a path segment's first place, without decoding the rows: most of a search's
-    time.
-    """
-    (begin_s,) = STAMP_FORMAT.unpack_from(segment.rows.data, STAMP_OFFSET)
-    return float(begin_s)

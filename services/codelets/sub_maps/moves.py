@@ -26,7 +26,30 @@ class Moves(NamedTuple):
 
 def best_moves(mixture: Mixture, scene: Scene, labels: Indices, min_gain: float) -> Moves:
     """The best move of each object that gains at least so much by one."""
-    possible = _by_bonds(scene, labels)
+    first, second = scene.edges.T
+    is_between = labels[first] != labels[second]
+    at_border = np.zeros(len(labels), bool)
+    at_border[first[is_between]] = True
+    at_border[second[is_between]] = True
+
+    # Of each object with a neighbour in another cluster, and each cluster of its neighbours: the
+    # sum of the bonds between them.
+    ends = np.concatenate([first, second])
+    others = np.concatenate([second, first])
+    chosen = at_border[ends]
+    clusters = int(labels.max(initial=-1)) + 1
+    keys = ends[chosen] * clusters + labels[others[chosen]]
+    found, number = np.unique(keys, return_inverse=True)
+    bonds = np.bincount(number, np.concatenate([scene.bonds, scene.bonds])[chosen], len(found))
+    objects, targets = np.divmod(found, max(1, clusters))
+
+    is_own = targets == labels[objects]
+    own_bonds = np.zeros(len(labels))
+    own_bonds[objects[is_own]] = bonds[is_own]
+
+    # Every move to another cluster gains the bonds there, less those of the own one.
+    by_bonds = Moves(objects, targets, bonds - own_bonds[objects])
+    possible = by_bonds.select(~is_own)
     statistics = summed(scene.rows, labels)
     evidence = mixture.log_evidence(statistics)
 
@@ -58,30 +81,3 @@ def gain_most(scene: Scene, moves: Moves) -> Moves:
     np.minimum.at(best_beside, first, rank[second])
     np.minimum.at(best_beside, second, rank[first])
     return moves.select(rank[moves.objects] < best_beside[moves.objects])
-
-
-def _by_bonds(scene: Scene, labels: Indices) -> Moves:
-    """Every move of an object to a cluster of its neighbours, and what it gains by its bonds."""
-    first, second = scene.edges.T
-    is_between = labels[first] != labels[second]
-    at_border = np.zeros(len(labels), bool)
-    at_border[first[is_between]] = True
-    at_border[second[is_between]] = True
-
-    # Of each object with a neighbour in another cluster, and each cluster of its neighbours: the
-    # sum of the bonds between them.
-    ends = np.concatenate([first, second])
-    others = np.concatenate([second, first])
-    chosen = at_border[ends]
-    clusters = int(labels.max(initial=-1)) + 1
-    keys = ends[chosen] * clusters + labels[others[chosen]]
-    found, number = np.unique(keys, return_inverse=True)
-    bonds = np.bincount(number, np.concatenate([scene.bonds, scene.bonds])[chosen], len(found))
-    objects, targets = np.divmod(found, max(1, clusters))
-
-    is_own = targets == labels[objects]
-    own_bonds = np.zeros(len(labels))
-    own_bonds[objects[is_own]] = bonds[is_own]
-
-    gained = Moves(objects, targets, bonds - own_bonds[objects])
-    return gained.select(~is_own)

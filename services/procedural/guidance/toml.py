@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 
-from cogmap.schemas.cognition import GuidanceScheme, Relation
+from cogmap.schemas.cognition import GuidanceScheme
 
 
 def written(schemes: Iterable[GuidanceScheme]) -> str:
@@ -15,7 +15,11 @@ def written(schemes: Iterable[GuidanceScheme]) -> str:
 
 def _table(scheme: GuidanceScheme) -> str:
     lines = ["[[guidance]]", f"name = {json.dumps(scheme.name)}", "landmarks = ["]
-    lines += [f"    {_landmark(landmark)}," for landmark in scheme.landmarks]
+    for landmark in scheme.landmarks:
+        look = json.dumps(landmark.look)
+        stands = f"range_m = {landmark.range_m:.3f}, bearing_rad = {landmark.bearing_rad:.4f}"
+        lines.append(f"    {{ look = {look}, {stands} }},")
+
     path = ", ".join(f"[{ahead_m:.3f}, {left_m:.3f}]" for ahead_m, left_m in scheme.path_m)
     lines += [
         "]",
@@ -25,10 +29,3 @@ def _table(scheme: GuidanceScheme) -> str:
         "",
     ]
     return "\n".join(lines)
-
-
-def _landmark(landmark: Relation) -> str:
-    look = json.dumps(landmark.look)
-    range_m = f"{landmark.range_m:.3f}"
-    bearing_rad = f"{landmark.bearing_rad:.4f}"
-    return f"{{ look = {look}, range_m = {range_m}, bearing_rad = {bearing_rad} }}"

@@ -20,20 +20,17 @@ def barriers(roads: Sequence[Road]) -> dict[str, Prop]:
         if road.length_m > other.length_m:
             longest[road.name] = road
 
-    return {name: _barrier(road) for name, road in longest.items()}
+    found = {}
+    for name, road in longest.items():
+        # Across the middle of the road and its pavements.
+        x_m, y_m = road.middle
+        found[name] = Prop(
+            kind="barrier",
+            x_m=x_m,
+            y_m=y_m,
+            heading_rad=math.remainder(road.heading_rad + math.pi / 2, math.tau),
+            size_m=(road.width_m + 2 * PAVEMENT_WIDTH_M, THICKNESS_M, HEIGHT_M),
+            look=0,
+        )
 
-
-def _barrier(road: Road) -> Prop:
-    """A barrier across the middle of a road and its pavements."""
-    x_m, y_m = road.middle
-    across_rad = math.remainder(road.heading_rad + math.pi / 2, math.tau)
-    length_m = road.width_m + 2 * PAVEMENT_WIDTH_M
-
-    return Prop(
-        kind="barrier",
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=across_rad,
-        size_m=(length_m, THICKNESS_M, HEIGHT_M),
-        look=0,
-    )
+    return found

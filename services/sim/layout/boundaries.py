@@ -73,6 +73,26 @@ def outlines(shapes: Sequence[Sequence[Point]]) -> Floats:
     return np.array(sides, float).reshape(-1, 4)
 
 
+def points_along(segments_m: Floats, step_m: float) -> Floats:
+    """Return (k, 2) points along (n, 4) segments, `step_m` apart at most."""
+    starts_m = segments_m[:, :2]
+    along_m = segments_m[:, 2:] - starts_m
+    lengths_m = np.hypot(along_m[:, 0], along_m[:, 1])
+
+    needed = np.ceil(lengths_m / step_m)
+    counts = needed.astype(int).clip(1)
+    firsts = np.cumsum(counts) - counts
+
+    # Of each point: the number of its segment, and its place among the points of that one.
+    segment = np.repeat(np.arange(len(segments_m)), counts)
+    place = np.arange(len(segment)) - firsts[segment]
+    share = (place + 0.5) / counts[segment]
+
+    offset_m = share[:, None] * along_m[segment]
+    points_m: Floats = starts_m[segment] + offset_m
+    return points_m
+
+
 def clearance_m(segments_m: Floats, x_m: float, y_m: float) -> float:
     """The distance from a point to the nearest of (n, 4) segments, infinite where there is none."""
     if not len(segments_m):

@@ -194,8 +194,7 @@ def invented(seed: int, count: int) -> tuple[BuildingType, ...]:
 
     kinds = []
     for number in range(count):
-        name = f"invented-{seed}-{number}"
-        kinds.append(_invent(name, rng))
+        kinds.append(_invent(f"invented-{seed}-{number}", rng))
 
     return tuple(kinds)
 
@@ -209,7 +208,7 @@ def _invent(name: str, rng: np.random.Generator) -> BuildingType:
 
     wall = _paint(rng)
     accent = _paint(rng)
-    while _difference(wall, accent) < MIN_CONTRAST:
+    while max(abs(x - y) for x, y in zip(wall, accent, strict=True)) < MIN_CONTRAST:
         accent = _paint(rng)
 
     trim = _rgb(str(rng.choice(_FINISHES)))
@@ -229,12 +228,6 @@ def _invent(name: str, rng: np.random.Generator) -> BuildingType:
         pattern=pattern,
         roof_shape="gable" if is_gabled else "flat",
     )
-
-
-def _difference(a: Colour, b: Colour) -> int:
-    """The greatest difference of red, green or blue."""
-    differences = [abs(x - y) for x, y in zip(a, b, strict=True)]
-    return max(differences)
 
 
 def _paint(rng: np.random.Generator) -> Colour:

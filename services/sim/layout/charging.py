@@ -119,10 +119,21 @@ def _post(road: Road, along_m: float, side: float) -> Prop:
 def _free(posts: Sequence[Prop], place: Place) -> list[Prop]:
     """Those that stand on no street, in no building, and beside nothing else."""
     middles_m = _middles_m(posts)
-    is_free = _is_beside_streets(middles_m, place.roads)
+    streets = surfaces(place.roads)
+    along_m, left_m = streets.local(middles_m)
+    is_along = np.abs(along_m) < streets.half_length_m + _HALF_M
+    is_across = np.abs(left_m) < streets.half_width_m + _HALF_M
+    is_free = np.asarray(~(is_along & is_across).any(axis=1))
+
     is_free &= _is_apart(middles_m, [(plot.x_m, plot.y_m) for plot in place.plots], BUILDING_M)
     is_free &= _is_apart(middles_m, [(prop.x_m, prop.y_m) for prop in place.props], PROP_M)
-    is_free &= _is_outside(middles_m, place)
+
+    boxes = [plot.footprint for plot in place.plots]
+    west, south, east, north = np.array(boxes, float).reshape(-1, 4).T
+    x_m = middles_m[:, :1]
+    y_m = middles_m[:, 1:]
+    is_inside = (x_m >= west) & (x_m <= east) & (y_m >= south) & (y_m <= north)
+    is_free &= ~is_inside.any(axis=1)
 
     free = []
     for number in np.flatnonzero(is_free).tolist():
@@ -139,32 +150,10 @@ def _middles_m(posts: Sequence[Prop]) -> Floats:
     return np.array(middles, float).reshape(-1, 2)
 
 
-def _is_beside_streets(points_m: Floats, roads: Sequence[Road]) -> Booleans:
-    """(n,): which of (n, 2) posts reach into no street."""
-    streets = surfaces(roads)
-    along_m, left_m = streets.local(points_m)
-
-    is_along = np.abs(along_m) < streets.half_length_m + _HALF_M
-    is_across = np.abs(left_m) < streets.half_width_m + _HALF_M
-    is_on_street = is_along & is_across
-    return np.asarray(~is_on_street.any(axis=1))
-
-
 def _is_apart(points_m: Floats, others: Sequence[Point], apart_m: float) -> Booleans:
     """(n,): which of (n, 2) points are at least `apart_m` from all others."""
     others_m = np.array(others, float).reshape(-1, 2)
     return np.asarray((_distances_m(points_m, others_m) >= apart_m).all(axis=1))
-
-
-def _is_outside(points_m: Floats, place: Place) -> Booleans:
-    """(n,): which of (n, 2) points are outside every building's bounding box."""
-    boxes = [plot.footprint for plot in place.plots]
-    west, south, east, north = np.array(boxes, float).reshape(-1, 4).T
-
-    x_m = points_m[:, :1]
-    y_m = points_m[:, 1:]
-    is_inside = (x_m >= west) & (x_m <= east) & (y_m >= south) & (y_m <= north)
-    return np.asarray(~is_inside.any(axis=1))
 
 
 def _spread(
@@ -179,7 +168,14 @@ def _spread(
     best: list[int] = []
     least_m = np.inf
     for _ in range(DRAWS):
-        chosen = _drawn(rng, is_apart, count)
+        # Draw places that are all apart, until no other is.
+        chosen: list[int] = []
+        is_left = np.ones(len(is_apart), bool)
+        while len(chosen) < count and is_left.any():
+            number = int(rng.choice(np.flatnonzero(is_left)))
+            chosen.append(number)
+            is_left &= is_apart[number]
+
         if len(chosen) < count:
             continue
 
@@ -189,20 +185,6 @@ def _spread(
             best = chosen
 
     return best
-
-
-def _drawn(rng: np.random.Generator, is_apart: Booleans, count: int) -> list[int]:
-    """The numbers of `count` places that are all apart, `is_apart` (n, n); fewer where no other
-    is.
-    """
-    chosen: list[int] = []
-    is_left = np.ones(len(is_apart), bool)
-    while len(chosen) < count and is_left.any():
-        number = int(rng.choice(np.flatnonzero(is_left)))
-        chosen.append(number)
-        is_left &= is_apart[number]
-
-    return chosen
 
 
 def _distances_m(points_m: Floats, others_m: Floats) -> Floats:

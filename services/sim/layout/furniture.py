@@ -104,7 +104,11 @@ _PROBABILITIES = (0.38, 0.14, 0.18, 0.14, 0.08, 0.08)
 def furnish(seed: int, roads: Sequence[Road], plots: Sequence[Plot]) -> tuple[Prop, ...]:
     """Props along `roads` and some farther away, clear of every street and every building."""
     rng = np.random.default_rng([seed, 0xF0])
-    candidates = [*_along(rng, roads, _SPACING_M), *_scattered(rng)]
+    candidates = _along(rng, roads, _SPACING_M)
+    for _ in range(_SCATTERED):
+        x_m, y_m = rng.uniform(-_AROUND_M, _AROUND_M, 2).tolist()
+        heading_rad = float(rng.uniform(-math.pi, math.pi))
+        candidates.append(_some_prop(rng, x_m, y_m, heading_rad))
 
     return _clear(candidates, roads, plots)
 
@@ -144,18 +148,6 @@ def _along(rng: np.random.Generator, roads: Sequence[Road], spacing_m: float) ->
             while along_m < road.length_m:
                 props.append(_beside(rng, road, along_m, side))
                 along_m += float(rng.uniform(0.6, 2.0)) * spacing_m
-
-    return props
-
-
-def _scattered(rng: np.random.Generator) -> list[Prop]:
-    """Candidates anywhere around the town."""
-    props = []
-    for _ in range(_SCATTERED):
-        x_m, y_m = rng.uniform(-_AROUND_M, _AROUND_M, 2).tolist()
-        heading_rad = float(rng.uniform(-math.pi, math.pi))
-
-        props.append(_some_prop(rng, x_m, y_m, heading_rad))
 
     return props
 

@@ -48,45 +48,46 @@ class Place:
         """The place as it travels, with the streets named in `closed` closed, and without the
         buildings numbered in `gone`.
         """
-        standing = [plot for number, plot in enumerate(self.plots) if number not in gone]
         streets = []
         for road in self.roads:
-            streets.append(_street(road, road.name in closed))
+            line_m = [road.start, road.end]
+            is_closed = road.name in closed
+            streets.append(
+                Street(name=road.name, line_m=line_m, width_m=road.width_m, closed=is_closed)
+            )
+
+        standing = [plot for number, plot in enumerate(self.plots) if number not in gone]
+        buildings = []
+        for plot in standing:
+            building = Building(
+                name=plot.kind.name,
+                pose=Pose(x_m=plot.x_m, y_m=plot.y_m, heading_rad=plot.heading_rad),
+                width_m=plot.kind.width_m,
+                depth_m=plot.kind.depth_m,
+                height_m=plot.kind.height_m,
+                district=plot.district,
+                function=plot.function,
+                outline_m=list(plot.outline),
+            )
+            buildings.append(building)
+
+        obstacles = []
+        for prop in self.props:
+            length_m, width_m, height_m = prop.size_m
+            obstacle = Obstacle(
+                kind=prop.kind,
+                pose=Pose(x_m=prop.x_m, y_m=prop.y_m, heading_rad=prop.heading_rad),
+                length_m=length_m,
+                width_m=width_m,
+                height_m=height_m,
+            )
+            obstacles.append(obstacle)
 
         return TrueTown(
             seed=self.seed,
             streets=streets,
-            buildings=[_building(plot) for plot in standing],
-            obstacles=[_obstacle(prop) for prop in self.props],
+            buildings=buildings,
+            obstacles=obstacles,
             kerbs_m=Array.of(self.kerbs_m, "<f4"),
             walls_m=Array.of(outlines([plot.corners for plot in standing]), "<f4"),
         )
-
-
-def _street(road: Road, is_closed: bool) -> Street:
-    line_m = [road.start, road.end]
-    return Street(name=road.name, line_m=line_m, width_m=road.width_m, closed=is_closed)
-
-
-def _building(plot: Plot) -> Building:
-    return Building(
-        name=plot.kind.name,
-        pose=Pose(x_m=plot.x_m, y_m=plot.y_m, heading_rad=plot.heading_rad),
-        width_m=plot.kind.width_m,
-        depth_m=plot.kind.depth_m,
-        height_m=plot.kind.height_m,
-        district=plot.district,
-        function=plot.function,
-        outline_m=list(plot.outline),
-    )
-
-
-def _obstacle(prop: Prop) -> Obstacle:
-    length_m, width_m, height_m = prop.size_m
-    return Obstacle(
-        kind=prop.kind,
-        pose=Pose(x_m=prop.x_m, y_m=prop.y_m, heading_rad=prop.heading_rad),
-        length_m=length_m,
-        width_m=width_m,
-        height_m=height_m,
-    )

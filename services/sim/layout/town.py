@@ -64,8 +64,11 @@ class Town(Place):
             corner = self.corners[(len(points) - 1) % 4]
             length_m = math.dist(here, corner)
             if left_m <= length_m:
-                points.append(_between(here, corner, left_m / length_m))
-                return points
+                share = left_m / length_m
+                here_x, here_y = here
+                end_x = here_x + share * (corner[0] - here_x)
+                end_y = here_y + share * (corner[1] - here_y)
+                return [*points, (end_x, end_y)]
 
             points.append(corner)
             here = corner
@@ -84,7 +87,12 @@ def generate(seed: int, kinds: tuple[BuildingType, ...] = CATALOGUE) -> Town:
         half_x_m = float(rng.uniform(23, 28))
         half_y_m = float(rng.uniform(18, 21))
         roads = _roads(rng, half_x_m, half_y_m)
-        plots = _settle(rng, roads, kinds)
+        settlement = _Settlement(rng, [road.area(_REACH_M) for road in roads], kinds)
+        south, east, north, west = roads[:4]
+        for road in (south, north, east, west):
+            settlement.line(road, left=True)
+            settlement.line(road, left=False)
+        plots = settlement.plots
 
     start_x_m = float(rng.uniform(-0.7, -0.3)) * half_x_m
 
@@ -101,21 +109,6 @@ def generate(seed: int, kinds: tuple[BuildingType, ...] = CATALOGUE) -> Town:
             (-half_x_m, -half_y_m),
         ),
     )
-
-
-def _settle(
-    rng: np.random.Generator, roads: list[Road], kinds: tuple[BuildingType, ...]
-) -> list[Plot]:
-    """Buildings on both sides of the loop."""
-    streets = [road.area(_REACH_M) for road in roads]
-    settlement = _Settlement(rng, streets, kinds)
-
-    south, east, north, west = roads[:4]
-    for road in (south, north, east, west):
-        settlement.line(road, left=True)
-        settlement.line(road, left=False)
-
-    return settlement.plots
 
 
 @dataclass
@@ -147,35 +140,27 @@ class _Settlement:
             along_m += plot.kind.width_m + gap_m
 
     def _fitting(self, road: Road, along_m: float, left: bool) -> Plot | None:
-        """The first of the next kinds that fits `along_m` from the road's start."""
-        for kind in self.kinds[:CANDIDATES]:
-            plot = self._plot(kind, road, along_m, left)
-            end_m = along_m + kind.width_m
-            if end_m < road.length_m + _REACH_M and self._is_free(plot.footprint):
-                return plot
-
-        return None
-
-    def _plot(self, kind: BuildingType, road: Road, along_m: float, left: bool) -> Plot:
+        """Return the first of the next kinds that fits `along_m` from the road's start."""
         # A front looks to the right of its heading: to the road.
         turn_rad = 0.0 if left else math.pi
         heading_rad = math.remainder(road.heading_rad + turn_rad, math.tau)
-
-        garden_m = float(self.rng.uniform(0.3, 2.0))
-        back_m = _REACH_M + garden_m + kind.depth_m / 2
-        left_m = back_m if left else -back_m
-
-        middle_m = along_m + kind.width_m / 2
-        x_m, y_m = road.point(middle_m, left_m)
-        return Plot(kind, round(x_m, 3), round(y_m, 3), heading_rad)
-
-    def _is_free(self, area: Rectangle) -> bool:
-        if any(overlap(area, street, STREET_GAP_M) for street in self.streets):
-            return False
-
         footprints = [plot.footprint for plot in self.plots]
 
-        return not any(overlap(area, other, BUILDING_GAP_M) for other in footprints)
+        for kind in self.kinds[:CANDIDATES]:
+            garden_m = float(self.rng.uniform(0.3, 2.0))
+            back_m = _REACH_M + garden_m + kind.depth_m / 2
+            x_m, y_m = road.point(along_m + kind.width_m / 2, back_m if left else -back_m)
+            plot = Plot(kind, round(x_m, 3), round(y_m, 3), heading_rad)
+            if along_m + kind.width_m >= road.length_m + _REACH_M:
+                continue
+
+            area = plot.footprint
+            meets_street = any(overlap(area, street, STREET_GAP_M) for street in self.streets)
+            if meets_street or any(overlap(area, other, BUILDING_GAP_M) for other in footprints):
+                continue
+            return plot
+
+        return None
 
 
 def _roads(rng: np.random.Generator, half_x_m: float, half_y_m: float) -> list[Road]:
@@ -202,12 +187,3 @@ def _roads(rng: np.random.Generator, half_x_m: float, half_y_m: float) -> list[R
         Road("Station Road", corner, station),
         Road("Mill Lane", opposite, mill),
     ]
-
-
-def _between(a: Point, b: Point, share: float) -> Point:
-    a_x, a_y = a
-    b_x, b_y = b
-    x = a_x + share * (b_x - a_x)
-    y = a_y + share * (b_y - a_y)
-
-    return x, y

@@ -102,16 +102,10 @@ class StereoCamera:
         rng: np.random.Generator,
     ) -> Exposure:
         """The exposure in `light`, shadows up to `top_m`."""
-        bright = self._brightness(exposure, station, top_m, light)
+        rays = self._rays @ station.axes.T.astype(np.float32)
+        bright = brightness(exposure.depth_m, rays, station.at_m, top_m, light)
         image = expose(exposure.image, bright, light, rng)
         return replace(exposure, image=image)
-
-    def _brightness(
-        self, exposure: Exposure, station: Station, top_m: Singles, light: Light
-    ) -> Singles:
-        to_world = station.axes.T.astype(np.float32)
-        rays = self._rays @ to_world
-        return brightness(exposure.depth_m, rays, station.at_m, top_m, light)
 
     def _stations(self) -> tuple[Station, Station]:
         """The left and the right camera."""
@@ -140,11 +134,15 @@ class StereoCamera:
         if world.egl is not None:
             world.egl.check()
 
+        _, down, forward = station.axes.T
+        target = (station.at_m + forward).tolist()
+        view = pybullet.computeViewMatrix(station.at_m.tolist(), target, (-down).tolist())
+
         mount = self.calibration
         _, _, rgba, depth, mask = pybullet.getCameraImage(
             mount.width_px,
             mount.height_px,
-            _view(station),
+            view,
             self._projection,
             lightDirection=light.sun if light else _NOON,
             lightColor=(1, 1, 1),
@@ -163,8 +161,10 @@ class StereoCamera:
 
         body = np.asarray(mask, np.int32)
         is_sky = body == world.sky
-        depth_m = np.where(is_sky, np.float32(0), _metres(np.asarray(depth)))
-        return Exposure(image, depth_m, body)
+        # Depth along the axis from OpenGL's depth buffer.
+        nearer_m = (FAR_M - NEAR_M) * np.asarray(depth, np.float64)
+        depth_m = (FAR_M * NEAR_M / (FAR_M - nearer_m)).astype(np.float32)
+        return Exposure(image, np.where(is_sky, np.float32(0), depth_m), body)
 
 
 def _rays(calibration: Calibration) -> Singles:
@@ -182,26 +182,6 @@ def _rays(calibration: Calibration) -> Singles:
     rays = np.stack([x, y, forward], axis=2)
 
     return rays.astype(np.float32)
-
-
-def _view(station: Station) -> list[float]:
-    """OpenGL's view matrix of a camera."""
-    _, down, forward = station.axes.T
-    up = (-down).tolist()
-
-    eye = station.at_m.tolist()
-    target = (station.at_m + forward).tolist()
-    view: list[float] = pybullet.computeViewMatrix(eye, target, up)
-
-    return view
-
-
-def _metres(depth: Singles) -> Singles:
-    """Depth along the axis from OpenGL's depth buffer."""
-    share = depth.astype(np.float64)
-    nearer_m = (FAR_M - NEAR_M) * share
-    depth_m = FAR_M * NEAR_M / (FAR_M - nearer_m)
-    return depth_m.astype(np.float32)
 
 
 def _projection(mount: Calibration) -> list[float]:

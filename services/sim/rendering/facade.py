@@ -31,9 +31,18 @@ def side(kind: BuildingType, width_m: float, number: int) -> Image:
     if kind.pattern in PAINT:
         PAINT[kind.pattern](wall)
 
-    _windows(wall, is_front, rng)
+    storeys = max(1, int((wall.height_m - 0.6) / STOREY_M))
+    columns = max(2, int(width_m / _BAY_M))
+    for storey in range(storeys):
+        for column in range(columns):
+            middle_m = (column + 0.5) * width_m / columns
+            is_over_door = abs(middle_m - width_m / 2) < _HALF_ENTRANCE_M
+            if not (is_front and storey == 0 and is_over_door):
+                shade = float(rng.uniform(0.7, 1.5))
+                _add_window(wall, middle_m, storey * STOREY_M + _SILL_M, shade)
+
     if is_front:
-        _entrance(wall)
+        _add_entrance(wall)
 
     wall.box(0, 0, width_m, _PLINTH_M, shaded(kind.wall, 0.55))
 
@@ -59,68 +68,33 @@ def _generator(kind: BuildingType, number: int) -> np.random.Generator:
     return np.random.default_rng([zlib.crc32(name), number])
 
 
-def _windows(wall: Wall, is_front: bool, rng: np.random.Generator) -> None:
-    storeys = max(1, int((wall.height_m - 0.6) / STOREY_M))
-    columns = max(2, int(wall.width_m / _BAY_M))
-    door_m = wall.width_m / 2
-
-    for storey in range(storeys):
-        for column in range(columns):
-            middle_m = (column + 0.5) * wall.width_m / columns
-            is_over_door = abs(middle_m - door_m) < _HALF_ENTRANCE_M
-            if is_front and storey == 0 and is_over_door:
-                continue
-
-            sill_m = storey * STOREY_M + _SILL_M
-            shade = float(rng.uniform(0.7, 1.5))
-            _window(wall, middle_m, sill_m, shade)
-
-
-def _window(wall: Wall, middle_m: float, sill_m: float, shade: float) -> None:
+def _add_window(wall: Wall, middle_m: float, sill_m: float, shade: float) -> None:
     trim = wall.kind.trim
-    wall.box(middle_m - 0.6, sill_m - 0.1, 1.2, 1.6, trim)
+    bottom_m = sill_m - 0.1
+    wall.box(middle_m - 0.6, bottom_m, 1.2, 1.6, trim)
 
     left_m = middle_m - 0.48
-    glass = shaded(_GLASS, shade)
-    wall.box(left_m, sill_m, 0.96, 1.4, glass)
-
+    wall.box(left_m, sill_m, 0.96, 1.4, shaded(_GLASS, shade))
     wall.box(middle_m - 0.05, sill_m, 0.1, 1.4, trim)
     wall.box(left_m, sill_m + 0.85, 0.96, 0.1, trim)
 
     if wall.kind.pattern == "shutters":
-        _shutters(wall, middle_m, sill_m)
+        wall.box(middle_m - 1.2, bottom_m, 0.6, 1.6, wall.kind.accent)
+        wall.box(middle_m + 0.6, bottom_m, 0.6, 1.6, wall.kind.accent)
 
 
-def _shutters(wall: Wall, middle_m: float, sill_m: float) -> None:
-    accent = wall.kind.accent
-    bottom_m = sill_m - 0.1
-
-    left_m = middle_m - 1.2
-    wall.box(left_m, bottom_m, 0.6, 1.6, accent)
-    right_m = middle_m + 0.6
-    wall.box(right_m, bottom_m, 0.6, 1.6, accent)
-
-
-def _entrance(wall: Wall) -> None:
+def _add_entrance(wall: Wall) -> None:
+    """Add two gates, or a door, over which a pharmacy has a cross."""
+    kind = wall.kind
     middle_m = wall.width_m / 2
-    if wall.kind.pattern == "gates":
-        _gate(wall, middle_m - 3.4)
-        _gate(wall, middle_m + 0.2)
+    if kind.pattern == "gates":
+        for left_m in (middle_m - 3.4, middle_m + 0.2):
+            wall.box(left_m, 0, 3.2, 3.4, kind.trim)
+            wall.box(left_m + 0.2, 0, 2.8, 3.2, kind.door)
         return
 
-    wall.box(middle_m - 0.95, 0, 1.9, 2.7, wall.kind.trim)
-    wall.box(middle_m - 0.75, 0, 1.5, 2.5, wall.kind.door)
-
-    if wall.kind.pattern == "cross":
-        _cross(wall, middle_m)
-
-
-def _gate(wall: Wall, left_m: float) -> None:
-    wall.box(left_m, 0, 3.2, 3.4, wall.kind.trim)
-    wall.box(left_m + 0.2, 0, 2.8, 3.2, wall.kind.door)
-
-
-def _cross(wall: Wall, middle_m: float) -> None:
-    accent = wall.kind.accent
-    wall.box(middle_m - 0.3, 3.0, 0.6, 2.0, accent)
-    wall.box(middle_m - 1.0, 3.7, 2.0, 0.6, accent)
+    wall.box(middle_m - 0.95, 0, 1.9, 2.7, kind.trim)
+    wall.box(middle_m - 0.75, 0, 1.5, 2.5, kind.door)
+    if kind.pattern == "cross":
+        wall.box(middle_m - 0.3, 3.0, 0.6, 2.0, kind.accent)
+        wall.box(middle_m - 1.0, 3.7, 2.0, 0.6, kind.accent)

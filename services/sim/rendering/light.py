@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats, Singles
+from cogmap.geometry.arrays import Floats, Singles
 from cogmap.services.sim.layout.plan import Rectangle
 from cogmap.services.sim.rendering.wall import Image
 
@@ -85,20 +85,13 @@ def relief(boxes: list[Box]) -> Singles:
     heights_m = np.zeros(shape, np.float32)
 
     for area, height_m in boxes:
-        west, south, east, north = (_cell(side_m) for side_m in area)
+        sides = [max(_CELLS // 2 + round(side_m / _CELL_M), 0) for side_m in area]
+        west, south, east, north = sides
         cells = heights_m[south:north, west:east]
 
         np.maximum(cells, height_m, out=cells)
 
     return heights_m
-
-
-def _cell(side_m: float) -> int:
-    """The row or column of a coordinate, at least 0."""
-    middle = _CELLS // 2
-    cell = middle + round(side_m / _CELL_M)
-
-    return max(cell, 0)
 
 
 def shadow_top(heights_m: Singles, light: Light) -> Singles:
@@ -117,21 +110,15 @@ def shadow_top(heights_m: Singles, light: Light) -> Singles:
         dx = round(step * east / flat)
         dy = round(step * north / flat)
         drop_m = np.float32(step * _CELL_M * up / flat)
-        _cast_shadow(top_m, heights_m - drop_m, dx, dy)
+
+        # A cell is in the shadow of the one that is dx and dy further on.
+        shaded_rows, casting_rows = _shifted(dy)
+        shaded_columns, casting_columns = _shifted(dx)
+        shaded = top_m[shaded_rows, shaded_columns]
+        casting = heights_m[casting_rows, casting_columns] - drop_m
+        np.maximum(shaded, casting, out=shaded)
 
     return top_m
-
-
-def _cast_shadow(top_m: Singles, casting_m: Singles, dx: int, dy: int) -> None:
-    """Raise each cell of `top_m` to the height of the shadow that the cell `dx` and `dy` further on
-    casts on it.
-    """
-    shaded_rows, casting_rows = _shifted(dy)
-    shaded_columns, casting_columns = _shifted(dx)
-
-    shaded = top_m[shaded_rows, shaded_columns]
-    casting = casting_m[casting_rows, casting_columns]
-    np.maximum(shaded, casting, out=shaded)
 
 
 def _shifted(cells: int) -> tuple[slice, slice]:
@@ -153,25 +140,21 @@ def brightness(
     reach_m = (depth_m - _CLEAR_M)[..., None]
     points_m = at.astype(np.float32) + rays * reach_m
 
-    is_shaded = _is_under(top_m, points_m) & (depth_m > 0)
+    cells = points_m[..., :2] / _CELL_M + _CELLS / 2
+    column, row = np.moveaxis(cells.clip(0, _CELLS - 1).astype(np.int64), 2, 0)
+    is_shaded = (points_m[..., 2] < top_m[row, column]) & (depth_m > 0)
     share = np.where(is_shaded, light.shade, 1.0).astype(np.float32)
     softened = cv2.blur(share, _PENUMBRA_PX)
     return np.asarray(softened, np.float32)
 
 
-def _is_under(heights_m: Singles, points_m: Singles) -> Booleans:
-    """(h, w): which of (h, w, 3) points are lower than a relief is there."""
-    cells = points_m[..., :2] / _CELL_M + _CELLS / 2
-    inside = cells.clip(0, _CELLS - 1).astype(np.int64)
-    column, row = np.moveaxis(inside, 2, 0)
-
-    is_under: Booleans = points_m[..., 2] < heights_m[row, column]
-    return is_under
-
-
 def expose(image: Image, bright: Singles, light: Light, rng: np.random.Generator) -> Image:
     """`image` (h, w, 3) as the camera exposes it, where `bright` (h, w) is left of the light."""
-    exposed = _exposed(image, bright, light)
+    cast = np.asarray(light.cast, np.float32)
+    surface = image.astype(np.float32) / 255
+    lit = surface * bright[..., None]
+    linear = np.clip(lit * cast * light.gain, 0.0, 1.0)
+    exposed = np.asarray(linear ** np.float32(light.gamma), np.float32)
     if light.blur_px:
         blurred = cv2.GaussianBlur(exposed, (0, 0), light.blur_px)
         exposed = np.asarray(blurred, np.float32)
@@ -182,14 +165,3 @@ def expose(image: Image, bright: Singles, light: Light, rng: np.random.Generator
 
     rounded: Image = np.clip(levels + 0.5, 0, 255).astype(np.uint8)
     return rounded
-
-
-def _exposed(image: Image, bright: Singles, light: Light) -> Singles:
-    """The levels of a sharp image without noise, 0 to 1, float32 (h, w, 3)."""
-    cast = np.asarray(light.cast, np.float32)
-    surface = image.astype(np.float32) / 255
-    lit = surface * bright[..., None]
-
-    linear = np.clip(lit * cast * light.gain, 0.0, 1.0)
-    exposed = linear ** np.float32(light.gamma)
-    return np.asarray(exposed, np.float32)

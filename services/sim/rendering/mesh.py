@@ -35,7 +35,10 @@ class Mesh:
         """Add a convex polygon, its corners counter-clockwise as seen from its front."""
         first = len(self.vertices)
         if normal is None:
-            normal = _normal(corners)
+            a, b, c = np.asarray(corners[:3])
+            across = np.cross(b - a, c - a)
+            x, y, z = (across / np.linalg.norm(across)).tolist()
+            normal = (x, y, z)
 
         self.vertices += corners
         self.uvs += uvs
@@ -50,8 +53,8 @@ class Mesh:
         `tile_m`.
         """
         west, south, east, north = area
-        columns = pairwise(_cuts(west, east, cell_m))
-        rows = pairwise(_cuts(south, north, cell_m))
+        columns = pairwise(cuts(west, east, cell_m))
+        rows = pairwise(cuts(south, north, cell_m))
 
         for (x0, x1), (y0, y1) in itertools.product(columns, rows):
             corners = [(x0, y0), (x1, y0), (x1, y1), (x0, y1)]
@@ -82,16 +85,71 @@ class Mesh:
 
 
 def building(kind: BuildingType) -> tuple[Mesh, Image]:
-    """A building around the origin of its ground plan, width along x, front to -y, and the picture
-    on it.
+    """Return a building around the origin of its ground plan, width along x, front to -y, and the
+    picture on it: its four sides and its roof in a row.
     """
-    shell = _Shell(kind)
-    for number in range(4):
-        shell.add_side(number)
+    half_width_m = kind.width_m / 2
+    half_depth_m = kind.depth_m / 2
+    height_m = kind.height_m
+    is_gabled = kind.roof_shape == "gable"
+    eaves_m = height_m - _ROOF_RISE_M if is_gabled else height_m
 
-    shell.add_roof()
+    corners: list[Point] = [
+        (-half_width_m, -half_depth_m),
+        (half_width_m, -half_depth_m),
+        (half_width_m, half_depth_m),
+        (-half_width_m, half_depth_m),
+    ]
+    sides = list(pairwise([*corners, corners[0]]))
+    lengths_m = [math.dist(start, end) for start, end in sides]
+    pictures = [facade.side(kind, length_m, number) for number, length_m in enumerate(lengths_m)]
+    atlas, lefts = _side_by_side([*pictures, facade.roof(kind)])
 
-    return shell.mesh, shell.atlas
+    def uv(number: int, along_m: float, down_m: float) -> UV:
+        """Return the point of picture `number` in the atlas."""
+        height_px, width_px, _ = atlas.shape
+        column = lefts[number] + along_m * PX_PER_M
+        return column / width_px, down_m * PX_PER_M / height_px
+
+    mesh = Mesh()
+    for number, ((start_x, start_y), (end_x, end_y)) in enumerate(sides):
+        length_m = lengths_m[number]
+        # Along the wall, and up; with a gable, those at the sides have one.
+        outline = [(0.0, 0.0), (length_m, 0.0), (length_m, eaves_m), (0.0, eaves_m)]
+        if is_gabled and number % 2 == 1:
+            outline.insert(3, (length_m / 2, height_m))
+
+        vertices: list[Vertex] = []
+        uvs = []
+        for along_m, up_m in outline:
+            x_m = start_x + along_m * ((end_x - start_x) / length_m)
+            y_m = start_y + along_m * ((end_y - start_y) / length_m)
+            vertices.append((x_m, y_m, up_m))
+            uvs.append(uv(number, along_m, height_m - up_m))
+        mesh.polygon(vertices, uvs)
+
+    # A flat roof, or the two halves of a gabled one.
+    ridge_y = 0.0 if is_gabled else half_depth_m
+    below_ridge_m = half_depth_m - ridge_y
+    roof_uvs = [
+        uv(_ROOF, 0, kind.depth_m),
+        uv(_ROOF, kind.width_m, kind.depth_m),
+        uv(_ROOF, kind.width_m, below_ridge_m),
+        uv(_ROOF, 0, below_ridge_m),
+    ]
+    slopes = [((-half_width_m, -half_depth_m), (half_width_m, ridge_y))]
+    if is_gabled:
+        slopes.append(((half_width_m, half_depth_m), (-half_width_m, 0.0)))
+    for (eaves_x, eaves_y), (ridge_x, far_y) in slopes:
+        slope: list[Vertex] = [
+            (eaves_x, eaves_y, eaves_m),
+            (ridge_x, eaves_y, eaves_m),
+            (ridge_x, far_y, height_m),
+            (eaves_x, far_y, height_m),
+        ]
+        mesh.polygon(slope, roof_uvs)
+
+    return mesh, atlas
 
 
 def prism(kind: BuildingType, outline: Sequence[Point]) -> tuple[Mesh, Image]:
@@ -117,129 +175,12 @@ def prism(kind: BuildingType, outline: Sequence[Point]) -> tuple[Mesh, Image]:
     return mesh, picture
 
 
-class _Shell:
-    """The sides and the roof of a building as they are built, and one picture for all of them."""
-
-    def __init__(self, kind: BuildingType) -> None:
-        self.mesh = Mesh()
-        self._half_width_m = kind.width_m / 2
-        self._half_depth_m = kind.depth_m / 2
-        self._height_m = kind.height_m
-        self._is_gabled = kind.roof_shape == "gable"
-        self._eaves_m = kind.height_m - _ROOF_RISE_M if self._is_gabled else kind.height_m
-
-        w = self._half_width_m
-        d = self._half_depth_m
-        self._corners: list[Point] = [(-w, -d), (w, -d), (w, d), (-w, d), (-w, -d)]
-        self.atlas, self._lefts = _side_by_side(self._pictures(kind))
-
-    def _pictures(self, kind: BuildingType) -> list[Image]:
-        """The pictures of the walls, and that of the roof."""
-        pictures = []
-        for number, (start, end) in enumerate(pairwise(self._corners)):
-            length_m = math.dist(start, end)
-            pictures.append(facade.side(kind, length_m, number))
-
-        return [*pictures, facade.roof(kind)]
-
-    def add_side(self, number: int) -> None:
-        """Wall `number`; with a gable, those at the sides have one."""
-        start = self._corners[number]
-        end = self._corners[number + 1]
-        length_m = math.dist(start, end)
-
-        vertices: list[Vertex] = []
-        uvs = []
-        for along_m, up_m in self._outline(number, length_m):
-            x_m, y_m = _along(start, end, along_m)
-            vertices.append((x_m, y_m, up_m))
-            uvs.append(self._uv(number, along_m, self._height_m - up_m))
-
-        self.mesh.polygon(vertices, uvs)
-
-    def add_roof(self) -> None:
-        """A flat roof, or the two halves of a gabled one."""
-        half_width_m = self._half_width_m
-        half_depth_m = self._half_depth_m
-        ridge_y = 0.0 if self._is_gabled else half_depth_m
-        uvs = self._roof_uvs(ridge_y)
-
-        front = self._slope((-half_width_m, -half_depth_m), (half_width_m, ridge_y))
-        self.mesh.polygon(front, uvs)
-        if self._is_gabled:
-            back = self._slope((half_width_m, half_depth_m), (-half_width_m, 0))
-            self.mesh.polygon(back, uvs)
-
-    def _slope(self, eaves: Point, ridge: Point) -> list[Vertex]:
-        """A rectangle of the roof, between opposite corners at the eaves and at the ridge."""
-        eaves_x, eaves_y = eaves
-        ridge_x, ridge_y = ridge
-        return [
-            (eaves_x, eaves_y, self._eaves_m),
-            (ridge_x, eaves_y, self._eaves_m),
-            (ridge_x, ridge_y, self._height_m),
-            (eaves_x, ridge_y, self._height_m),
-        ]
-
-    def _outline(self, number: int, length_m: float) -> list[Point]:
-        """The corners of a wall: along it, and up."""
-        eaves_m = self._eaves_m
-        outline = [
-            (0.0, 0.0),
-            (length_m, 0.0),
-            (length_m, eaves_m),
-            (0.0, eaves_m),
-        ]
-        if self._is_gabled and number % 2 == 1:
-            outline.insert(3, (length_m / 2, self._height_m))
-
-        return outline
-
-    def _roof_uvs(self, ridge_y: float) -> list[UV]:
-        width_m = 2 * self._half_width_m
-        eaves_m = 2 * self._half_depth_m
-        ridge_m = self._half_depth_m - ridge_y
-
-        corners = ((0, eaves_m), (width_m, eaves_m), (width_m, ridge_m), (0, ridge_m))
-        return [self._uv(_ROOF, along_m, down_m) for along_m, down_m in corners]
-
-    def _uv(self, number: int, along_m: float, down_m: float) -> UV:
-        """The point of picture `number` in the atlas."""
-        height_px, width_px, _ = self.atlas.shape
-
-        column = self._lefts[number] + along_m * PX_PER_M
-        row = down_m * PX_PER_M
-
-        return column / width_px, row / height_px
-
-
-def _cuts(start: float, end: float, cell_m: float) -> list[float]:
-    """Where a stretch is cut to cells of `cell_m` at most."""
+def cuts(start: float, end: float, cell_m: float) -> list[float]:
+    """Return where a stretch is cut to cells of `cell_m` at most."""
     length = end - start
     cells = math.ceil(length / cell_m)
-    cuts: list[float] = np.linspace(start, end, cells + 1).tolist()
-    return cuts
-
-
-def _along(start: Point, end: Point, along_m: float) -> Point:
-    """The point `along_m` from `start` towards `end`."""
-    start_x, start_y = start
-    end_x, end_y = end
-    length_m = math.dist(start, end)
-
-    x_m = start_x + along_m * ((end_x - start_x) / length_m)
-    y_m = start_y + along_m * ((end_y - start_y) / length_m)
-    return x_m, y_m
-
-
-def _normal(corners: list[Vertex]) -> Vertex:
-    a, b, c = np.asarray(corners[:3])
-    across = np.cross(b - a, c - a)
-
-    length = np.linalg.norm(across)
-    x, y, z = (across / length).tolist()
-
-    return x, y, z
+    edges: list[float] = np.linspace(start, end, cells + 1).tolist()
+    return edges
 
 
 def _side_by_side(pictures: list[Image]) -> tuple[Image, list[int]]:

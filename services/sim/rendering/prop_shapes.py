@@ -12,7 +12,7 @@ import numpy as np
 
 from cogmap.services.sim.layout.catalogue import Colour
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE, Prop, Size
-from cogmap.services.sim.rendering.mesh import UV, Mesh, Vertex
+from cogmap.services.sim.rendering.mesh import Mesh, Vertex
 from cogmap.services.sim.rendering.wall import Image, roughen
 
 Colours = tuple[Colour, Colour]
@@ -54,30 +54,26 @@ def shape(prop: Prop) -> tuple[Mesh, Image]:
     return mesh, roughen(picture, rng, _GRAIN)
 
 
-def _tree(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+def tree(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    """Add a trunk and a crown."""
     width_m, _, tall_m = size_m
     reach_m = width_m / 2
 
     trunk = [(0.16, 0.0), (0.14, 0.5 * tall_m)]
     _rotate(mesh, trunk, _FIRST)
 
-    _rotate(mesh, _crown(reach_m, tall_m), _SECOND)
+    crown = []  # an ellipse
+    for angle_rad in np.linspace(0, math.pi, 6).tolist():
+        radius_m = reach_m * math.sin(angle_rad)
+        z_m = 0.66 * tall_m + 0.34 * tall_m * -math.cos(angle_rad)
+        crown.append((radius_m, z_m))
+    _rotate(mesh, crown, _SECOND)
 
     return _BARK, _tinted((58, 112, 44), rng)
 
 
-def _crown(reach_m: float, tall_m: float) -> list[tuple[float, float]]:
-    """The profile of a tree's crown: an ellipse."""
-    profile = []
-    for angle_rad in np.linspace(0, math.pi, 6).tolist():
-        radius_m = reach_m * math.sin(angle_rad)
-        z_m = 0.66 * tall_m + 0.34 * tall_m * -math.cos(angle_rad)
-        profile.append((radius_m, z_m))
-
-    return profile
-
-
-def _lamp(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+def lamp(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    """Add a post with a shade."""
     _, _, tall_m = size_m
     neck_m = tall_m - 0.4
 
@@ -90,7 +86,8 @@ def _lamp(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     return _DARK, _tinted((226, 220, 190), rng)
 
 
-def _car(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+def car(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    """Add a body with a cabin."""
     long_m, wide_m, tall_m = size_m
     bonnet_m = 0.58 * tall_m
 
@@ -105,7 +102,8 @@ def _car(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     return _DARK, _any_colour(rng, 30, 235)
 
 
-def _hedge(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+def hedge(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    """Add a hedge."""
     long_m, wide_m, tall_m = size_m
 
     low = (-long_m / 2, -wide_m / 2, 0.0)
@@ -115,7 +113,8 @@ def _hedge(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     return _DARK, _tinted((50, 96, 40), rng)
 
 
-def _kiosk(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+def kiosk(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    """Add a hut with a roof."""
     long_m, wide_m, tall_m = size_m
     eaves_m = tall_m - 0.3
 
@@ -132,7 +131,8 @@ def _kiosk(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     return hut_colour, _any_colour(rng, 40, 230)
 
 
-def _bin(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+def litter_bin(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    """Add a bin."""
     width_m, _, tall_m = size_m
     reach_m = width_m / 2
 
@@ -142,8 +142,8 @@ def _bin(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     return _DARK, _tinted((70, 84, 90), rng)
 
 
-def _barrier(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
-    """Boards across the street, red and white by turns."""
+def barrier(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    """Add boards across the street, red and white by turns."""
     long_m, wide_m, tall_m = size_m
     count = max(2, round(long_m / _BOARD_M))
     edges_m = np.linspace(-long_m / 2, long_m / 2, count + 1).tolist()
@@ -156,8 +156,8 @@ def _barrier(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
     return _RED, _WHITE
 
 
-def _charging_place(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
-    """A post with a wide head."""
+def charging_place(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colours:
+    """Add a post with a wide head."""
     long_m, wide_m, tall_m = size_m
     neck_m = 0.6 * tall_m
 
@@ -173,14 +173,14 @@ def _charging_place(mesh: Mesh, size_m: Size, rng: np.random.Generator) -> Colou
 
 
 _BUILD: dict[str, Callable[[Mesh, Size, np.random.Generator], Colours]] = {
-    "tree": _tree,
-    "lamp": _lamp,
-    "car": _car,
-    "hedge": _hedge,
-    "kiosk": _kiosk,
-    "bin": _bin,
-    "barrier": _barrier,
-    CHARGING_PLACE: _charging_place,
+    "tree": tree,
+    "lamp": lamp,
+    "car": car,
+    "hedge": hedge,
+    "kiosk": kiosk,
+    "bin": litter_bin,
+    "barrier": barrier,
+    CHARGING_PLACE: charging_place,
 }
 
 
@@ -213,33 +213,22 @@ def _rotate(mesh: Mesh, profile: Sequence[tuple[float, float]], half: float) -> 
     heights = np.linspace(1, 0, len(profile)).tolist()
     rings = [Ring(radius, z, v) for (radius, z), v in zip(profile, heights, strict=True)]
 
-    for lower, upper in pairwise(rings):
-        for number in range(_SIDES):
-            _add_facet(mesh, lower, upper, number, half)
+    for number, (start_rad, end_rad) in enumerate(pairwise(_ANGLES_RAD)):
+        left = half + _MARGIN + _HALF_WIDTH * number / _SIDES
+        right = half + _MARGIN + _HALF_WIDTH * (number + 1) / _SIDES
+        middle_rad = (start_rad + end_rad) / 2
+        # Outwards and a little upwards.
+        normal = (math.cos(middle_rad), math.sin(middle_rad), 0.3)
 
-
-def _add_facet(mesh: Mesh, lower: Ring, upper: Ring, number: int, half: float) -> None:
-    """Add side `number` of those between two rings."""
-    start_rad = _ANGLES_RAD[number]
-    end_rad = _ANGLES_RAD[number + 1]
-    corners = [
-        _on_ring(lower, start_rad),
-        _on_ring(lower, end_rad),
-        _on_ring(upper, end_rad),
-        _on_ring(upper, start_rad),
-    ]
-
-    left = half + _MARGIN + _HALF_WIDTH * number / _SIDES
-    right = half + _MARGIN + _HALF_WIDTH * (number + 1) / _SIDES
-    uvs = [
-        (left, lower.v),
-        (right, lower.v),
-        (right, upper.v),
-        (left, upper.v),
-    ]
-
-    middle_rad = (start_rad + end_rad) / 2
-    mesh.polygon(corners, uvs, _outwards(middle_rad))
+        for lower, upper in pairwise(rings):
+            corners = [
+                _on_ring(lower, start_rad),
+                _on_ring(lower, end_rad),
+                _on_ring(upper, end_rad),
+                _on_ring(upper, start_rad),
+            ]
+            uvs = [(left, lower.v), (right, lower.v), (right, upper.v), (left, upper.v)]
+            mesh.polygon(corners, uvs, normal)
 
 
 def _on_ring(ring: Ring, angle_rad: float) -> Vertex:
@@ -248,30 +237,19 @@ def _on_ring(ring: Ring, angle_rad: float) -> Vertex:
     return x_m, y_m, ring.z_m
 
 
-def _outwards(angle_rad: float) -> Vertex:
-    """A normal that points outwards and a little upwards."""
-    x = math.cos(angle_rad)
-    y = math.sin(angle_rad)
-    return x, y, 0.3
-
-
 def _box(mesh: Mesh, low: Vertex, high: Vertex, half: float) -> None:
     """Add a box without a floor, painted with one half of the picture."""
     west, south, bottom_m = low
     east, north, top_m = high
     ground = [(west, south), (east, south), (east, north), (west, north)]
 
-    uvs = _uvs_of_half(half)
+    # The corners of that half, from its lower left counter-clockwise.
+    left = half + _MARGIN
+    right = left + _HALF_WIDTH
+    uvs = [(left, 1.0), (right, 1.0), (right, 0.0), (left, 0.0)]
     for start, end in pairwise([*ground, ground[0]]):
         wall = [(*start, bottom_m), (*end, bottom_m), (*end, top_m), (*start, top_m)]
         mesh.polygon(wall, uvs)
 
     lid = [(x, y, top_m) for x, y in ground]
     mesh.polygon(lid, uvs)
-
-
-def _uvs_of_half(half: float) -> list[UV]:
-    """The corners of one half of the picture, from its lower left counter-clockwise."""
-    left = half + _MARGIN
-    right = left + _HALF_WIDTH
-    return [(left, 1.0), (right, 1.0), (right, 0.0), (left, 0.0)]

@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from cogmap.geometry.arrays import Singles
 from cogmap.services.sim.layout.catalogue import BuildingType, Colour
 
 PX_PER_M = 20
@@ -76,17 +75,10 @@ def plain(side_px: int, colour: Colour) -> Image:
 
 
 def roughen(image: Image, rng: np.random.Generator, strength: float = 0.13) -> Image:
-    """`image` with grain on it."""
+    """Return `image` with grain on it: brightness factors around 1, in four scales, so that stereo
+    finds them near and far.
+    """
     height_px, width_px, _ = image.shape
-    grain = _grain(rng, height_px, width_px, strength)
-    factors = grain[..., None]
-    rough: Image = np.clip(image * factors, 0, 255).astype(np.uint8)
-
-    return rough
-
-
-def _grain(rng: np.random.Generator, height_px: int, width_px: int, strength: float) -> Singles:
-    """Brightness factors around 1, in four scales: stereo finds them near and far."""
     total = np.ones((height_px, width_px), np.float32)
     for scale, share in GRAIN:
         coarse_shape = (height_px // scale + 2, width_px // scale + 2)
@@ -95,4 +87,5 @@ def _grain(rng: np.random.Generator, height_px: int, width_px: int, strength: fl
         fine = cv2.resize(coarse, (width_px, height_px), interpolation=cv2.INTER_LINEAR)
         total += strength * share * fine
 
-    return total
+    rough: Image = np.clip(image * total[..., None], 0, 255).astype(np.uint8)
+    return rough

@@ -104,7 +104,13 @@ class Bodies:
         heading_rad: float = 0.0,
     ) -> int:
         """Add a body; `solid` is what nothing passes."""
-        shape = self._visual(model)
+        with self._file(f"{model.number}.obj", model.obj.encode()) as path:
+            shape = pybullet.createVisualShape(
+                pybullet.GEOM_MESH,
+                fileName=path,
+                specularColor=[0, 0, 0],
+                physicsClientId=self._client,
+            )
         body = pybullet.createMultiBody(
             0,
             solid,
@@ -117,17 +123,6 @@ class Bodies:
             body, -1, textureUniqueId=model.texture, physicsClientId=self._client
         )
         return int(body)
-
-    def _visual(self, model: Model) -> int:
-        with self._file(f"{model.number}.obj", model.obj.encode()) as path:
-            return int(
-                pybullet.createVisualShape(
-                    pybullet.GEOM_MESH,
-                    fileName=path,
-                    specularColor=[0, 0, 0],
-                    physicsClientId=self._client,
-                )
-            )
 
     @contextmanager
     def _file(self, name: str, content: bytes) -> Iterator[str]:

@@ -41,25 +41,17 @@ class Builder:
         return added
 
     def building(self, plot: Plot) -> int:
-        """A building that nothing passes."""
-        if plot.outline:
-            return self._prism(plot)
-
+        """Add a building that nothing passes."""
         kind = plot.kind
-        size_m = (kind.width_m, kind.depth_m, kind.height_m)
-        model = self._bodies.model(*mesh.building(kind))
         at_m = (plot.x_m, plot.y_m)
-        return self._bodies.add(model, self._box(size_m), at_m, plot.heading_rad)
+        if not plot.outline:
+            size_m = (kind.width_m, kind.depth_m, kind.height_m)
+            model = self._bodies.model(*mesh.building(kind))
+            return self._bodies.add(model, self._box(size_m), at_m, plot.heading_rad)
 
-    def _prism(self, plot: Plot) -> int:
-        """A building that is no rectangle."""
-        at_m = (plot.x_m, plot.y_m)
-        outline = []
-        for x_m, y_m in plot.outline:
-            outline.append((x_m - plot.x_m, y_m - plot.y_m))
-
-        model = self._bodies.model(*mesh.prism(plot.kind, outline))
-        solid = self._bodies.walls(outline, plot.kind.height_m)
+        outline = [(x_m - plot.x_m, y_m - plot.y_m) for x_m, y_m in plot.outline]
+        model = self._bodies.model(*mesh.prism(kind, outline))
+        solid = self._bodies.walls(outline, kind.height_m)
         return self._bodies.add(model, solid, at_m)
 
     def prop(self, prop: Prop, is_solid: bool) -> int:

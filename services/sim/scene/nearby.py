@@ -4,19 +4,19 @@ render and to simulate does not grow with the place. Pure.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
 from cogmap.services.sim.layout.plan import Point
 
 ADDED_M = 80.0
 HIDDEN_M = 95.0
 # How far the robot moves before the parts near it are chosen again, and how many are added then.
 MOVED_M = 2.0
-MOST_ADDED = 6
+MAX_ADDED = 6
 
 
 @dataclass(frozen=True)
@@ -50,49 +50,33 @@ class Nearby:
         self._reaches_m = np.array(reaches, float)
 
     def update(self, x_m: float, y_m: float) -> None:
-        """Follow the robot: where it moved on a little, add the nearest few that are missing; where
-        it was put somewhere else, all that are near.
+        """Follow the robot: if it moved on a little, add the nearest few that are missing; if it
+        was put somewhere else, all that are near.
         """
-        moved_m = self._moved_m(x_m, y_m)
+        moved_m = math.inf if self._last_m is None else math.dist(self._last_m, (x_m, y_m))
         if moved_m < MOVED_M:
             return
 
         self._last_m = (x_m, y_m)
         away_m = self._middles_m - (x_m, y_m)
         apart_m = np.hypot(away_m[:, 0], away_m[:, 1]) - self._reaches_m
-        self._hide_far(apart_m)
 
-        missing = self._missing(apart_m)
-        is_moved_on = moved_m <= HIDDEN_M - ADDED_M
-        for number in missing[:MOST_ADDED] if is_moved_on else missing:
-            self._add(number)
-
-    def _moved_m(self, x_m: float, y_m: float) -> float:
-        if self._last_m is None:
-            return float("inf")
-
-        last_x_m, last_y_m = self._last_m
-        return float(np.hypot(x_m - last_x_m, y_m - last_y_m))
-
-    def _add(self, number: int) -> None:
-        self._shown.add(number)
-        if number not in self._built:
-            self._built[number] = self.pieces[number].add()
-            return
-
-        for body in self._built[number]:
-            self.show(body)
-
-    def _hide_far(self, apart_m: Floats) -> None:
         for number in sorted(self._shown):
             if apart_m[number] > HIDDEN_M:
                 self._shown.remove(number)
                 for body in self._built[number]:
                     self.hide(body)
 
-    def _missing(self, apart_m: Floats) -> list[int]:
-        """The pieces near enough that are not there yet, from the nearest on."""
         order = np.argsort(apart_m, kind="stable").tolist()
-        return [
+        missing = [
             number for number in order if apart_m[number] <= ADDED_M and number not in self._shown
         ]
+        is_moved_on = moved_m <= HIDDEN_M - ADDED_M
+        for number in missing[:MAX_ADDED] if is_moved_on else missing:
+            self._shown.add(number)
+            if number not in self._built:
+                self._built[number] = self.pieces[number].add()
+                continue
+
+            for body in self._built[number]:
+                self.show(body)

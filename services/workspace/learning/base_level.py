@@ -5,26 +5,31 @@ What was broadcast as missing, a surprise with a salience below 0, is unlearned 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import msgspec
 
 from cogmap.graph import decay
 from cogmap.graph.graph import Graph
-from cogmap.schemas.cognition import Broadcast, Coalition
+from cogmap.schemas.cognition import Broadcast
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Operation
 from cogmap.schemas.nodes import KINDS, AnyNode, Attention, attention_id
-from cogmap.services.workspace.config import Config
 
-# The sigmoid rises as fast as the line in its middle.
-STEEPNESS = 4.0
-MIN_LEVEL = 1e-3
+LEARNING_RATE = 0.1
+"""What a base level gains in a broadcast. Of five views a second with an object, half or more lead
+to a broadcast about it; what is seen once, perhaps by mistake, is conscious once. LIDA has
+published no rate that we know.
+"""
+
+UNLEARNING_RATE = 0.4
+"""What the base level of a node that is broadcast as missing loses, times its salience. What was
+known best is kept no longer then, and is forgotten at once when it is missing three times.
+"""
 
 
 def learned_operations(
-    broadcasts: Iterable[Broadcast], graph: Graph, cycle: int, config: Config
+    broadcasts: Iterable[Broadcast], graph: Graph, cycle: int
 ) -> list[Operation]:
     """The nodes of `broadcasts` that `graph` still has, as of `cycle`, with their new base levels,
     and the attention codelets that keep something, with the cycle in which they were conscious.
@@ -32,49 +37,27 @@ def learned_operations(
     learned: dict[str, AnyNode] = {}
     for broadcast in broadcasts:
         is_surprise = broadcast.coalition.feeling is Feeling.SURPRISE
-        for told in broadcast.coalition.nodes:
-            missing = -min(0.0, told.salience) if is_surprise else 0.0
-            node = learned.get(told.id) or graph.nodes.get(told.id)
-            if node is not None and not KINDS[type(node)].persistent:
-                learned[node.id] = _learned(node, missing, graph, cycle, config)
+        for conscious in broadcast.coalition.nodes:
+            node = learned.get(conscious.id) or graph.nodes.get(conscious.id)
+            if node is None or KINDS[type(node)].persistent:
+                continue
 
-        memory = _reinforced(broadcast, broadcast.coalition, graph)
+            level = decay.base_level(node, cycle, graph.decay)
+            missing = -min(0.0, conscious.salience) if is_surprise else 0.0
+            if missing > 0:
+                level = max(0.0, level - UNLEARNING_RATE * missing)
+            else:
+                level = min(1.0, level + LEARNING_RATE)
+            learned[node.id] = msgspec.structs.replace(
+                node,
+                activation=decay.activation(node, cycle, graph.decay),
+                base_level=level,
+                cycle=cycle,
+            )
+
+        memory = graph.get(Attention, attention_id(broadcast.coalition.codelet))
         if memory is not None:
-            learned[memory.id] = memory
+            kept = msgspec.structs.replace(memory, conscious_cycle=broadcast.cycle)
+            learned[kept.id] = kept
 
     return [learned[name] for name in sorted(learned)]
-
-
-def risen(level: float, config: Config) -> float:
-    """A base level after one broadcast more, by a line or a sigmoid."""
-    if config.learning == "linear":
-        return min(1.0, level + config.learning_rate)
-
-    bounded = min(1 - MIN_LEVEL, max(MIN_LEVEL, level))
-    excitation = math.log(bounded / (1 - bounded)) + STEEPNESS * config.learning_rate
-    return max(level, 1 / (1 + math.exp(-excitation)))
-
-
-def _learned(node: AnyNode, missing: float, graph: Graph, cycle: int, config: Config) -> AnyNode:
-    """A node as of `cycle`, after a broadcast of it: as `missing`, 0 to 1, where it is above 0."""
-    level = decay.base_level(node, cycle, graph.decay)
-    if missing > 0:
-        after = max(0.0, level - config.unlearning_rate * missing)
-    else:
-        after = risen(level, config)
-
-    return msgspec.structs.replace(
-        node,
-        activation=decay.activation(node, cycle, graph.decay),
-        base_level=after,
-        cycle=cycle,
-    )
-
-
-def _reinforced(broadcast: Broadcast, won: Coalition, graph: Graph) -> Attention | None:
-    """What the codelet of a coalition keeps, after its broadcast; None where it keeps nothing."""
-    memory = graph.get(Attention, attention_id(won.codelet))
-    if memory is None:
-        return None
-
-    return msgspec.structs.replace(memory, conscious_cycle=broadcast.cycle)

@@ -12,7 +12,7 @@ from benchmarks.localization.delay import Delay
 from benchmarks.localization.drives import follow
 from benchmarks.localization.loop import LOCALIZATION, LocalizationLoop
 from benchmarks.localization.senses import moments
-from benchmarks.trajectory import trajectory_error_m
+from benchmarks.optional import trajectory_error_m
 from cogmap.data.mrclam import Robot
 from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats

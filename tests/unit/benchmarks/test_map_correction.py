@@ -13,7 +13,7 @@ from benchmarks.map_correction import reference
 from benchmarks.map_correction.false_groups import MIN_APART, false_closures
 from benchmarks.map_correction.files import read_graph
 from benchmarks.map_correction.measure import measure
-from benchmarks.trajectory import trajectory_error_m
+from benchmarks.optional import trajectory_error_m
 from cogmap.errors import UsageError
 from cogmap.estimation.pose_graph import cost
 from cogmap.estimation.reverse_replay import (

@@ -145,8 +145,8 @@ def test_an_old_python_is_named() -> None:
     assert list(installation.python_version((3, 12))) == []
 
 
-def test_the_simulator_is_at_home_on_its_python_and_platform() -> None:
-    assert list(installation.simulator((3, 11), "linux", "x86_64")) == []
+def test_rendering_is_at_home_on_its_python_and_platform() -> None:
+    assert list(installation.rendering((3, 11), "linux", "x86_64")) == []
 
 
 @pytest.mark.parametrize(
@@ -154,12 +154,13 @@ def test_the_simulator_is_at_home_on_its_python_and_platform() -> None:
     [((3, 12), "linux", "x86_64"), ((3, 11), "darwin", "arm64")],
     ids=["newer Python", "another platform"],
 )
-def test_a_python_or_platform_without_the_simulator_is_named(
+def test_a_python_or_platform_that_renders_nothing_is_named(
     version: tuple[int, int], platform: str, machine: str
 ) -> None:
-    (finding,) = installation.simulator(version, platform, machine)
+    (finding,) = installation.rendering(version, platform, machine)
 
     assert "needs Python 3.11 on Linux x86-64" in finding.wrong
+    assert "cogmap run --tour" in finding.remedy
 
 
 def test_a_dependency_that_is_missing_or_of_another_version_is_named() -> None:

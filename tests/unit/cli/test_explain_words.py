@@ -186,7 +186,7 @@ def test_after_a_broadcast_the_competition_is_refractory(tmp_path: Path) -> None
         "pass."
     ]
     assert reasons.of_action(found) == [
-        "Without a broadcast nothing is chosen: follow route, chosen in cycle 1, goes on."
+        "Without a broadcast nothing is chosen: follow route, chosen in cycle 1, continues."
     ]
     assert text.conscious_before(found) == (
         "last, in cycle 1, 0.10 s before: novelty: the agent at (3.0, -1.0) m, heading 0°, library"
@@ -250,7 +250,7 @@ def test_a_broadcast_that_led_to_no_action_says_what_goes_on(tmp_path: Path) -> 
     (sentence,) = reasons.of_action(cycle(tmp_path, cycles, 4))
 
     assert sentence.startswith("The broadcast led to no action")
-    assert sentence.endswith("follow route, chosen in cycle 1, goes on.")
+    assert sentence.endswith("follow route, chosen in cycle 1, continues.")
 
 
 def test_a_coalition_is_summed_up_by_its_first_nodes() -> None:

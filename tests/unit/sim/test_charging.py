@@ -10,8 +10,6 @@ import pytest
 from cogmap.errors import ConfigError
 from cogmap.robot import calibration
 from cogmap.schemas.sensing import Percept, Pose, TrueTown
-from cogmap.services.sim.driven.sensors import Sensors
-from cogmap.services.sim.driven.surroundings import Surroundings
 from cogmap.services.sim.layout import towns
 from cogmap.services.sim.layout.boundaries import clearance_m, surfaces
 from cogmap.services.sim.layout.catalogue import CATALOGUE
@@ -19,7 +17,9 @@ from cogmap.services.sim.layout.charging import with_charging_places
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE, Prop
 from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Plot, Road
-from cogmap.services.sim.scripted.percepts import PerceptErrors
+from cogmap.services.sim.percept_level.percepts import PerceptErrors
+from cogmap.services.sim.percept_level.surroundings import Surroundings
+from cogmap.services.sim.percept_level.town_sensors import TownSensors
 
 COUNT = 3
 NEAR_M = 5.0
@@ -106,8 +106,7 @@ def _seen(
 ) -> list[Percept]:
     """The percepts of charging places in a street with one."""
     street = Place(seed=1, roads=(STREET,), plots=plots, props=(post,), start=AT_ORIGIN)
-    near = Surroundings(street).near(pose.x_m, pose.y_m)
-    view = Sensors(street, errors, MOUNT, 1).look(pose, near)
+    view = TownSensors(street, Surroundings(street), errors, MOUNT, 1).look(pose)
     return [percept for percept in view.objects if percept.label == CHARGING_PLACE]
 
 
@@ -137,10 +136,9 @@ def test_a_charging_place_behind_a_building_is_not_seen() -> None:
 
 def test_percepts_of_charging_places_have_the_errors_of_buildings() -> None:
     street = Place(seed=1, roads=(STREET,), plots=(), props=(POST,), start=AT_ORIGIN)
-    near = Surroundings(street).near(0.0, 0.0)
-    sensors = Sensors(street, PerceptErrors(detected=0.8), MOUNT, 1)
+    sensors = TownSensors(street, Surroundings(street), PerceptErrors(detected=0.8), MOUNT, 1)
 
-    views = [sensors.look(AT_ORIGIN, near).objects for _ in range(400)]
+    views = [sensors.look(AT_ORIGIN).objects for _ in range(400)]
     ranges_m = [percept.range_m for percepts in views for percept in percepts]
 
     assert 0.7 < len(ranges_m) / len(views) < 0.9

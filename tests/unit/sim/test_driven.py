@@ -22,11 +22,7 @@ from cogmap.schemas.sensing import (
     TruePose,
     TrueTown,
 )
-from cogmap.services.sim.driven.camera import ColumnCamera, depths_m
-from cogmap.services.sim.driven.ground import MAX_RANGE_M
-from cogmap.services.sim.driven.robot import KinematicRobot
-from cogmap.services.sim.driven.sensors import Sensors, scan
-from cogmap.services.sim.driven.surroundings import Surroundings
+from cogmap.services.sim.drivers.kinematic import KinematicRobot
 from cogmap.services.sim.layout.blocks.town import generate
 from cogmap.services.sim.layout.boundaries import clearance_m
 from cogmap.services.sim.layout.catalogue import CATALOGUE
@@ -35,7 +31,11 @@ from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Plot, Road
 from cogmap.services.sim.module import Config, build
 from cogmap.services.sim.odometry import Noise
-from cogmap.services.sim.scripted.percepts import PerceptErrors
+from cogmap.services.sim.percept_level.column_camera import ColumnCamera, depths_m
+from cogmap.services.sim.percept_level.ground import MAX_RANGE_M
+from cogmap.services.sim.percept_level.percepts import PerceptErrors
+from cogmap.services.sim.percept_level.surroundings import Surroundings
+from cogmap.services.sim.percept_level.town_sensors import TownSensors, scan
 from cogmap.testing import of_type
 
 MOUNT = calibration()
@@ -148,8 +148,7 @@ def test_the_scan_is_limited_to_the_ranges_that_stereo_matches() -> None:
 
 
 def _seen(place: Place, pose: Pose = AT_ORIGIN, errors: PerceptErrors = EXACT):
-    near = Surroundings(place).near(pose.x_m, pose.y_m)
-    return Sensors(place, errors, MOUNT, seed=1).look(pose, near)
+    return TownSensors(place, Surroundings(place), errors, MOUNT, seed=1).look(pose)
 
 
 def test_road_and_boundary_are_where_the_street_is() -> None:
@@ -252,22 +251,18 @@ def test_a_barrier_closes_a_street_until_it_is_opened() -> None:
     surroundings = Surroundings(place)
     robot = KinematicRobot(AT_ORIGIN, surroundings)
 
-    surroundings.close([STREET.name])
+    surroundings.change([STREET.name], [])
     _driven(robot, _command(15.0, 15.0), 15.0)
     assert robot.pose.x_m == pytest.approx(30.0 - 0.2 - BODY_RADIUS_M, abs=0.2)
     assert robot.collisions == 1
 
-    seen = _seen_by(surroundings, place, Pose(x_m=20.0, y_m=0.0, heading_rad=0.0))
+    sensors = TownSensors(place, surroundings, EXACT, MOUNT, seed=1)
+    seen = sensors.look(Pose(x_m=20.0, y_m=0.0, heading_rad=0.0))
     assert seen.range_m[16] == pytest.approx(9.8, abs=0.2)
 
-    surroundings.close([])
+    surroundings.change([], [])
     _driven(robot, _command(15.0, 15.0), 5.0)
     assert robot.pose.x_m > 40.0
-
-
-def _seen_by(surroundings: Surroundings, place: Place, pose: Pose):
-    near = surroundings.near(pose.x_m, pose.y_m)
-    return Sensors(place, EXACT, MOUNT, seed=1).look(pose, near)
 
 
 def _config(**changes) -> Config:

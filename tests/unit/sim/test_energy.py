@@ -24,7 +24,7 @@ from cogmap.schemas.sensing import (
 from cogmap.services.sim.battery import Battery, PowerSupply
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE
 from cogmap.services.sim.module import Config, build
-from cogmap.services.sim.scripted.trajectory import Trajectory
+from cogmap.services.sim.trajectory import Trajectory
 from cogmap.testing import of_type
 
 HERE = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)

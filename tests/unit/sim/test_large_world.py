@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from cogmap.schemas.sensing import MotorCommand, Odometry, Pose, StreetClosure, TrueTown
+from cogmap.services.sim.camera_level import CameraSenses, driven
 from cogmap.services.sim.config import Config
 from cogmap.services.sim.layout.blocks.town import generate
 from cogmap.services.sim.layout.catalogue import BuildingType
 from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Plot, Road
 from cogmap.services.sim.scene.nearby import ADDED_M, HIDDEN_M, Nearby, Piece
-from cogmap.services.sim.simulation import Simulation
 from cogmap.services.sim.stdio import pybullet
 from cogmap.services.sim.world import World
 
@@ -148,20 +148,22 @@ def test_a_town_of_blocks_ends_by_time_and_publishes_what_closes() -> None:
     away_m = [math.dist(road.middle, (START.x_m, START.y_m)) for road in TOWN.roads]
     name = TOWN.roads[int(np.argmax(away_m))].name
     config = Config(town="blocks", town_size_m=150.0, duration_s=2.0, egl=False, width_px=64)
-    simulation = Simulation(config)
+    simulation = driven(config, None, ticks_per_frame=4)
     simulation.drive(MotorCommand(left_wheel_rad_s=10.0, right_wheel_rad_s=10.0))
-    assert simulation.changed_town() is None
+    assert simulation.changed_town() == []
 
     simulation.closed_streets.on_closure(StreetClosure(street=name, closed=True))
-    changed = simulation.changed_town()
+    (changed,) = simulation.changed_town()
     assert isinstance(changed, TrueTown)
     assert [street.name for street in changed.streets if street.closed] == [name]
-    assert simulation.changed_town() is None
+    assert simulation.changed_town() == []
 
     for _ in range(40):
-        assert isinstance(simulation.tick(), Odometry)
+        (measured,) = simulation.step()
+        assert isinstance(measured, Odometry)
     truth = simulation.truth()
-    simulation.world.close()
+    assert isinstance(simulation.senses, CameraSenses)
+    simulation.senses.world.close()
 
     assert truth.progress == 1.0
     assert truth.travelled_m > 1.0

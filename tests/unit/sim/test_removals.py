@@ -10,7 +10,7 @@ from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas.sensing import MotorCommand, Percepts, TrueTown
 from cogmap.services.sim.layout.removals import Removal, RemovedBuildings
 from cogmap.services.sim.module import Config, build
-from cogmap.services.sim.scripted.percepts import PerceptErrors
+from cogmap.services.sim.percept_level.percepts import PerceptErrors
 from cogmap.testing import of_type
 
 

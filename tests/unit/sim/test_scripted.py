@@ -11,12 +11,13 @@ from cogmap.errors import ConfigError
 from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas import topics
 from cogmap.schemas.sensing import MotorCommand, Percept, Percepts, Pose, SelfMotion, TruePose
-from cogmap.services.sim.module import Config, build
+from cogmap.services.sim.module import Config, build, scripted
 from cogmap.services.sim.odometry import Noise
-from cogmap.services.sim.scripted.percept_level import PerceptLevelSim
-from cogmap.services.sim.scripted.percepts import Landmark, PerceptErrors, PerceptSim
-from cogmap.services.sim.scripted.places import PlaceSim
-from cogmap.services.sim.scripted.trajectory import Line, Trajectory
+from cogmap.services.sim.percept_level.percepts import PerceptErrors, PerceptSim
+from cogmap.services.sim.percept_level.places import PlaceSim
+from cogmap.services.sim.simulation import Simulation
+from cogmap.services.sim.trajectory import Landmark, Line, Trajectory
+from cogmap.testing import of_type
 
 SILENT = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
 EXACT = PerceptErrors(
@@ -36,18 +37,19 @@ def _landmarks(number: int) -> list[Landmark]:
 
 def _simulation(
     line=SQUARE, noise: Noise = SILENT, errors: PerceptErrors = EXACT, seed: int = 1
-) -> PerceptLevelSim:
-    return PerceptLevelSim(
-        Trajectory(line_m=line, landmarks=[HOUSE], speed_m_s=3.0), noise, errors, 1, seed
-    )
+) -> Simulation:
+    config = Config(frame_hz=1, noise=noise, percepts=errors, seed=seed)
+    return scripted(config, Trajectory(line_m=line, landmarks=[HOUSE], speed_m_s=3.0))
 
 
-def _ride(simulation: PerceptLevelSim) -> list[tuple[TruePose, SelfMotion, Percepts]]:
+def _ride(simulation: Simulation) -> list[tuple[TruePose, SelfMotion, Percepts]]:
     ride = []
     while simulation.progress < 1.0:
         simulation.step()
         truth = simulation.truth()
-        motion, _, percepts = simulation.view()
+        view = simulation.view()
+        (motion,) = of_type(SelfMotion, view)
+        (percepts,) = of_type(Percepts, view)
         ride.append((truth, motion, percepts))
 
     return ride
@@ -179,7 +181,7 @@ def test_a_place_is_recognized_in_the_same_direction_only() -> None:
 
 def test_each_command_leads_to_a_frame_until_the_line_ends() -> None:
     trajectory = Trajectory(line_m=[(0.0, 0.0), (9.0, 0.0)], landmarks=[HOUSE], speed_m_s=3.0)
-    module = build(Config(frame_hz=1, odometry_hz=1, trajectory=trajectory), run=LOCKSTEP)
+    module = build(Config(frame_hz=1, trajectory=trajectory), run=LOCKSTEP)
     assert module.start is not None
 
     messages = module.stamp(module.start())

@@ -7,7 +7,7 @@ import pytest
 from cogmap.runtime.run import LOCKSTEP, REAL_TIME, Run
 from cogmap.schemas.nodes import Need, need_id
 from cogmap.schemas.sensing import Energy
-from cogmap.services.workspace.body import Body
+from cogmap.services.workspace.senses import Body
 
 
 def energy(stamp_ns: int, level: float, is_charging: bool = False) -> Energy:

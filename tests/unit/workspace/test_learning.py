@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from cogmap.runtime.run import REAL_TIME, Run
-from cogmap.schemas.cognition import Competition, Trigger
+from cogmap.schemas.cognition import Broadcast, Coalition, Competition, Trigger
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Decay, Phase
 from cogmap.schemas.nodes import (
@@ -17,19 +17,23 @@ from cogmap.schemas.nodes import (
     attention_id,
     object_id,
 )
-from cogmap.services.workspace.config import Config
-from cogmap.services.workspace.learning.base_level import learned_operations, risen
-from cogmap.testing import agent, broadcast, graph_of, landmark, percept, percepts, self_motion
+from cogmap.services.workspace.learning.base_level import learned_operations
+from cogmap.testing import agent, graph_of, landmark, percept, percepts, self_motion
 from tests.support.world.scenes import Desk
 
 CONSCIOUS = Run(lockstep=True, participants={"global_workspace": 1})
-LINEAR = Config(learning_rate=0.1, unlearning_rate=0.4)
-SIGMOID = Config(learning_rate=0.1, learning="sigmoid")
 
 
-def _learned(node: AnyNode, told: AnyNode, config: Config = LINEAR) -> list[AnyNode]:
+def _broadcast(
+    *nodes: AnyNode, cycle: int = 1, codelet: str = "test", feeling: Feeling = Feeling.NONE
+) -> Broadcast:
+    coalition = Coalition(codelet=codelet, activation=0.5, nodes=list(nodes), feeling=feeling)
+    return Broadcast(cycle=cycle, trigger=Trigger.ONE_COALITION, coalition=coalition)
+
+
+def _learned(node: AnyNode, told: AnyNode) -> list[AnyNode]:
     graph = graph_of(node)
-    return learned_operations([broadcast(told)], graph, 1, config)  # type: ignore[return-value]
+    return learned_operations([_broadcast(told)], graph, 1)  # type: ignore[return-value]
 
 
 def test_what_was_conscious_has_a_higher_base_level() -> None:
@@ -48,8 +52,8 @@ def test_what_is_persistent_or_forgotten_learns_nothing() -> None:
 
 def test_two_broadcasts_teach_twice() -> None:
     house = landmark("house", base_level=0.2)
-    both = [broadcast(house, cycle=1), broadcast(house, cycle=2)]
-    (learned,) = learned_operations(both, graph_of(house), 3, LINEAR)
+    both = [_broadcast(house, cycle=1), _broadcast(house, cycle=2)]
+    (learned,) = learned_operations(both, graph_of(house), 3)
 
     assert isinstance(learned, Object)
     assert learned.base_level == pytest.approx(0.4)
@@ -58,7 +62,7 @@ def test_two_broadcasts_teach_twice() -> None:
 def test_activation_decays_as_it_would_have() -> None:
     node = Node(id="a", kind="thing", activation=0.5, base_level=0.5, cycle=1)
     rates = Decay(activation=0.1, base_level=0.01)
-    (learned,) = learned_operations([broadcast(node)], graph_of(rates, node), 3, LINEAR)
+    (learned,) = learned_operations([_broadcast(node)], graph_of(rates, node), 3)
 
     assert isinstance(learned, Node)
     assert (learned.activation, learned.cycle) == (pytest.approx(0.3), 3)
@@ -68,8 +72,8 @@ def test_activation_decays_as_it_would_have() -> None:
 def test_what_is_broadcast_as_missing_is_unlearned() -> None:
     house = landmark("house", base_level=0.9)
     missing = msgspec.structs.replace(house, salience=-1.0)
-    told = broadcast(missing, feeling=Feeling.SURPRISE)
-    (learned,) = learned_operations([told], graph_of(house), 1, LINEAR)
+    told = _broadcast(missing, feeling=Feeling.SURPRISE)
+    (learned,) = learned_operations([told], graph_of(house), 1)
 
     assert isinstance(learned, Object)
     assert learned.base_level == pytest.approx(0.5)
@@ -79,26 +83,17 @@ def test_what_is_broadcast_as_missing_is_unlearned() -> None:
 def test_what_is_dangerous_is_learned_as_what_is_not() -> None:
     house = landmark("house", base_level=0.2)
     dangerous = msgspec.structs.replace(house, salience=-1.0)
-    told = broadcast(dangerous, feeling=Feeling.DANGER)
-    (learned,) = learned_operations([told], graph_of(house), 1, LINEAR)
+    told = _broadcast(dangerous, feeling=Feeling.DANGER)
+    (learned,) = learned_operations([told], graph_of(house), 1)
 
     assert isinstance(learned, Object)
     assert learned.base_level == pytest.approx(0.3)
 
 
-def test_a_sigmoid_learns_most_in_the_middle_and_never_reaches_one() -> None:
-    gains = [risen(level, SIGMOID) - level for level in (0.05, 0.5, 0.95)]
-
-    assert gains[1] == pytest.approx(0.1, abs=0.01)
-    assert max(gains) == gains[1]
-    assert 0.95 < risen(0.95, SIGMOID) < 1.0
-    assert risen(0.95, LINEAR) == 1.0
-
-
 def test_the_codelet_of_a_broadcast_keeps_that_it_was_conscious() -> None:
     memory = Attention(id=attention_id("novelty"), codelet="novelty", brought_cycle=4)
-    told = broadcast(agent(), cycle=5, codelet="novelty")
-    (learned,) = learned_operations([told], graph_of(memory), 6, LINEAR)
+    told = _broadcast(agent(), cycle=5, codelet="novelty")
+    (learned,) = learned_operations([told], graph_of(memory), 6)
 
     assert learned == msgspec.structs.replace(memory, conscious_cycle=5)
 
@@ -125,7 +120,7 @@ def _compete(desk: Desk, cycle: int, *nodes: AnyNode) -> None:
     trigger = Trigger.ONE_COALITION if nodes else Trigger.NONE
     desk.feed(Competition(cycle=cycle, contenders=[], trigger=trigger))
     if nodes:
-        desk.feed(broadcast(*nodes, cycle=cycle))
+        desk.feed(_broadcast(*nodes, cycle=cycle))
 
 
 def _begun(desk: Desk) -> list[int]:
@@ -141,7 +136,7 @@ def test_in_lockstep_a_cycle_waits_for_the_competition_before_and_its_broadcast(
     desk.feed(Competition(cycle=1, contenders=[], trigger=Trigger.ONE_COALITION))
     assert _begun(desk) == [1]
 
-    desk.feed(broadcast(landmark("house")))
+    desk.feed(_broadcast(landmark("house")))
     assert _begun(desk) == [1, 2]
 
 
@@ -169,7 +164,7 @@ def test_a_cycle_learns_from_each_broadcast_once() -> None:
     desk.drive(range(1, 2), percept("house"))
     learned = _base_level(desk)
     _compete(desk, 2)
-    desk.feed(broadcast(landmark("house"), cycle=1))
+    desk.feed(_broadcast(landmark("house"), cycle=1))
     desk.drive(range(2, 3), percept("house"))
 
     assert learned > before
@@ -194,7 +189,7 @@ def test_a_restored_workspace_waits_for_no_competition_before_and_learns_what_is
     assert again.module.restore is not None
     again.module.restore(desk.deltas)
 
-    again.feed(broadcast(landmark("house"), cycle=1))
+    again.feed(_broadcast(landmark("house"), cycle=1))
     again.see(1, percept("house"))
 
     (delta, *_) = again.deltas

@@ -11,6 +11,7 @@ from cogmap.schemas.codelets import Task
 from cogmap.schemas.nodes import Self
 from cogmap.schemas.process import Presence
 from cogmap.services.codelets.sub_maps.coarse_places import EVERY_CYCLES
+from cogmap.services.workspace.dispatch import MAX_ATTEMPTS
 from cogmap.testing import (
     PERIOD_NS,
     agent,
@@ -170,10 +171,10 @@ def test_a_task_that_no_worker_holds_is_given_to_the_first_that_joins() -> None:
 
 
 def test_a_task_lost_at_every_attempt_is_given_up_and_the_cycle_continues() -> None:
-    desk = Desk("w1", "w2", run=REAL_TIME, lease_ms=10.0, deadline_ms=10_000.0, attempts=3)
+    desk = Desk("w1", "w2", run=REAL_TIME, lease_ms=10.0, deadline_ms=10_000.0)
     desk.clock(stamp_ns(0))
     desk.see(0)
-    for number, ms in enumerate((11, 22, 33)):
+    for number, ms in enumerate((11, 22, 33, 44, 55)):
         (asked,) = desk.take()
         _, attempt = _held(desk, asked)
         assert asked.codelet == "localization"
@@ -187,9 +188,9 @@ def test_a_task_lost_at_every_attempt_is_given_up_and_the_cycle_continues() -> N
 
 
 def test_in_lockstep_a_task_that_kills_every_worker_is_given_up_and_named() -> None:
-    desk = Desk(attempts=3)
+    desk = Desk()
     desk.see(0)
-    for number in range(3):
+    for number in range(MAX_ATTEMPTS):
         assert not any(delta.phase == "end" for delta in desk.deltas)
         desk.presence(f"w{number}")
         desk.presence(f"w{number}", alive=False)
@@ -199,7 +200,7 @@ def test_in_lockstep_a_task_that_kills_every_worker_is_given_up_and_named() -> N
 
     (rejecting,) = [delta for delta in desk.deltas if delta.rejected]
     assert desk.deltas[-1].phase == "end"
-    assert rejecting.reasons == ["task 1/localization was given to 3 workers and lost each time"]
+    assert rejecting.reasons == ["task 1/localization was given to 5 workers and lost each time"]
 
 
 def test_in_lockstep_neither_lease_nor_deadline_ends() -> None:

@@ -13,17 +13,24 @@ from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.sensing import RangeScan
-from cogmap.testing import percepts, range_scan, self_motion, stamp_ns
+from cogmap.services.workspace.senses import MAX_SCAN_AGE_NS
+from cogmap.testing import percepts, self_motion, stamp_ns
 from tests.support.world.scenes import Desk
 
 RAYS = ((0.1, 5.0), (0.0, 0.0))
 SCANNED = Run(lockstep=True, participants={"sim": 1})
-LATE_MS = 30
+LATE_MS = MAX_SCAN_AGE_NS // 1_000_000
 
 
 def _scan(frame: int, rays: Sequence[Sequence[float]] = RAYS, late_ms: float = 0) -> RangeScan:
     """The scan of view `frame`, or one that was taken before it."""
-    return range_scan(*rays, frame=frame, stamp_ns=stamp_ns(frame) - int(late_ms * 1e6))
+    bearing_rad, range_m = np.array(rays, np.float32).reshape(-1, 2).T
+    return RangeScan(
+        stamp_ns=stamp_ns(frame) - int(late_ms * 1e6),
+        frame=frame,
+        bearing_rad=Array.of(bearing_rad),
+        range_m=Array.of(range_m),
+    )
 
 
 def _view(desk: Desk, frame: int) -> None:
@@ -54,7 +61,7 @@ def stepped() -> Desk:
 @pytest.fixture
 def timely() -> Desk:
     """In real time."""
-    return Desk("w1", run=REAL_TIME, max_scan_age_ms=LATE_MS)
+    return Desk("w1", run=REAL_TIME)
 
 
 def test_in_lockstep_a_cycle_waits_for_the_scan_of_its_view(stepped: Desk) -> None:

@@ -5,11 +5,10 @@ another. Pure.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.services.sim.layout.blocks.districts import Builder, District, Districts, function_of
+from cogmap.services.sim.layout.blocks.districts import Builder, Districts, function_of
 from cogmap.services.sim.layout.catalogue import BuildingType
 from cogmap.services.sim.layout.plan import PAVEMENT_WIDTH_M, Plot, Rectangle, Road
 
@@ -19,16 +18,7 @@ STEP_M = 1.5
 GARDEN_M = (0.3, 1.5)
 BETWEEN_M = (1.2, 3.5)
 CANDIDATES = 3
-SHORTEST_M = 12.0
-
-
-class Front(NamedTuple):
-    """Where a building begins along a road, on which side, and how far behind the pavement."""
-
-    road: Road
-    along_m: float
-    left: bool
-    garden_m: float
+MIN_LENGTH_M = 12.0
 
 
 def settle(
@@ -37,7 +27,7 @@ def settle(
     """Buildings wherever one fits along the roads."""
     settlement = _Settlement(rng, roads, districts)
     for road in roads:
-        if road.length_m >= SHORTEST_M:
+        if road.length_m >= MIN_LENGTH_M:
             settlement.line(road, left=True)
             settlement.line(road, left=False)
 
@@ -70,68 +60,49 @@ class _Settlement:
                 along_m += STEP_M
                 continue
 
-            self._build(plot)
+            self.plots.append(plot)
+            self._waiting[plot.district].remove(plot.kind)
+            area = np.array([_grown(plot.footprint, BUILDING_GAP_M)])
+            self._occupied = np.vstack([self._occupied, area])
+
             gap_m = float(self._rng.uniform(*BETWEEN_M))
             along_m += plot.kind.width_m + gap_m
 
-    def _build(self, plot: Plot) -> None:
-        self.plots.append(plot)
-        self._waiting[plot.district].remove(plot.kind)
-
-        area = np.array([_grown(plot.footprint, BUILDING_GAP_M)])
-        self._occupied = np.vstack([self._occupied, area])
-
     def _fitting(self, road: Road, along_m: float, left: bool) -> Plot | None:
-        """The first of the district's next kinds that fits `along_m` from the road's start."""
+        """Return the first of the district's next kinds that fits `along_m` from the road's start,
+        on one side of it.
+        """
         side_m = road.width_m if left else -road.width_m
         district = self._districts.at(*road.point(along_m, side_m))
-        front = Front(road, along_m, left, float(self._rng.uniform(*GARDEN_M)))
+        garden_m = float(self._rng.uniform(*GARDEN_M))
+        # A front looks to the right of its heading: to the road.
+        turn_rad = 0.0 if left else math.pi
+        heading_rad = math.remainder(road.heading_rad + turn_rad, math.tau)
 
-        for kind in self._candidates(district):
-            plot = _plot(kind, district, front)
-            if self._is_free(plot.footprint):
-                return plot
-
-        return None
-
-    def _candidates(self, district: District) -> list[BuildingType]:
         waiting = self._waiting.setdefault(district.name, [])
         while len(waiting) < CANDIDATES:
             waiting.append(self._builder.next(district))
 
-        return waiting
+        for kind in waiting:
+            back_m = road.width_m / 2 + PAVEMENT_WIDTH_M + garden_m + kind.depth_m / 2
+            x_m, y_m = road.point(along_m + kind.width_m / 2, back_m if left else -back_m)
+            plot = Plot(
+                kind=kind,
+                x_m=round(x_m, 3),
+                y_m=round(y_m, 3),
+                heading_rad=heading_rad,
+                district=district.name,
+                function=function_of(kind),
+            )
 
-    def _is_free(self, area: Rectangle) -> bool:
-        west, south, east, north = area
-        others_west, others_south, others_east, others_north = self._occupied.T
+            west, south, east, north = plot.footprint
+            others_west, others_south, others_east, others_north = self._occupied.T
+            overlaps_in_x = (west < others_east) & (others_west < east)
+            overlaps_in_y = (south < others_north) & (others_south < north)
+            if not (overlaps_in_x & overlaps_in_y).any():
+                return plot
 
-        begins_in_x = west < others_east
-        ends_in_x = others_west < east
-        begins_in_y = south < others_north
-        ends_in_y = others_south < north
-
-        overlaps = begins_in_x & ends_in_x & begins_in_y & ends_in_y
-        return not bool(overlaps.any())
-
-
-def _plot(kind: BuildingType, district: District, front: Front) -> Plot:
-    road = front.road
-    # A front looks to the right of its heading: to the road.
-    turn_rad = 0.0 if front.left else math.pi
-    heading_rad = math.remainder(road.heading_rad + turn_rad, math.tau)
-
-    back_m = road.width_m / 2 + PAVEMENT_WIDTH_M + front.garden_m + kind.depth_m / 2
-    left_m = back_m if front.left else -back_m
-    x_m, y_m = road.point(front.along_m + kind.width_m / 2, left_m)
-
-    return Plot(
-        kind=kind,
-        x_m=round(x_m, 3),
-        y_m=round(y_m, 3),
-        heading_rad=heading_rad,
-        district=district.name,
-        function=function_of(kind),
-    )
+        return None
 
 
 def _grown(area: Rectangle, gap_m: float) -> Rectangle:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import colorsys
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from cogmap.services.sim.layout.catalogue import CATALOGUE, BuildingType, Colour
 from cogmap.services.sim.layout.plan import Point
 
 OWN_FUNCTION = 0.85
-FEWEST = 3
+MIN_DISTRICTS = 3
 METRES_A_DISTRICT = 75.0
 TRIES = 24
 FUNCTIONS: dict[str, tuple[str, ...]] = {
@@ -104,10 +105,10 @@ def _block_middle(lines_m: tuple[float, ...], at_m: float) -> float:
 
 
 def divide(rng: np.random.Generator, grid: Grid) -> Districts:
-    """FEWEST districts at least, more in a larger town."""
+    """Return MIN_DISTRICTS districts at least, more in a larger town."""
     span_m = grid.x_m[-1] - grid.x_m[0]
     wanted = round(span_m / METRES_A_DISTRICT)
-    count = min(len(FUNCTIONS), max(FEWEST, wanted))
+    count = min(len(FUNCTIONS), max(MIN_DISTRICTS, wanted))
 
     shuffled = rng.permutation(list(FUNCTIONS))
     functions = [str(function) for function in shuffled[:count]]
@@ -136,21 +137,12 @@ def _spread(rng: np.random.Generator, grid: Grid, count: int) -> list[Point]:
     for _ in range(TRIES):
         numbers = rng.choice(len(middles), count, replace=False).tolist()
         chosen = [middles[number] for number in numbers]
-        apart_m2 = _least_apart_m2(chosen)
+        apart_m2 = min(_apart_m2(a, b) for a, b in combinations(chosen, 2))
         if apart_m2 > widest_m2:
             best = chosen
             widest_m2 = apart_m2
 
     return best
-
-
-def _least_apart_m2(points: list[Point]) -> float:
-    distances_m2 = []
-    for number, point in enumerate(points):
-        for other in points[:number]:
-            distances_m2.append(_apart_m2(point, other))
-
-    return min(distances_m2)
 
 
 def _apart_m2(a: Point, b: Point) -> float:

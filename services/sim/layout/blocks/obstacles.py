@@ -25,23 +25,25 @@ def furnish(
     """Props on the pavements, in the streets and on the square."""
     on_pavements = line_pavements(rng, streets.roads, plots, PAVEMENT_SPACING_M)
 
+    # Cars at either kerb, one at a time, away from the crossings.
     parked = []
     for road in streets.roads:
-        if road not in streets.dead_ends:
-            parked += _parked(rng, road)
+        if road in streets.dead_ends:
+            continue
 
-    return (*on_pavements, *parked, _kiosk(rng, streets.square))
+        along_m = CROSSING_M + float(rng.uniform(0, APART_M[1]))
+        while along_m < road.length_m - CROSSING_M:
+            parked.append(_car(rng, road, along_m))
+            along_m += float(rng.uniform(*APART_M))
 
+    # A kiosk beside the middle of the square, clear of the streets that cross it.
+    middle_x, middle_y = streets.square.middle
+    sign_x, sign_y = rng.choice([-1.0, 1.0], 2).tolist()
+    aside_x, aside_y = rng.uniform(*ASIDE_M, 2).tolist()
+    at_m = (middle_x + sign_x * aside_x, middle_y + sign_y * aside_y)
+    kiosk = prop_of_kind(rng, "kiosk", at_m, 0.0)
 
-def _parked(rng: np.random.Generator, road: Road) -> list[Prop]:
-    """Cars at either kerb, one at a time, away from the crossings."""
-    cars = []
-    along_m = CROSSING_M + float(rng.uniform(0, APART_M[1]))
-    while along_m < road.length_m - CROSSING_M:
-        cars.append(_car(rng, road, along_m))
-        along_m += float(rng.uniform(*APART_M))
-
-    return cars
+    return (*on_pavements, *parked, kiosk)
 
 
 def _car(rng: np.random.Generator, road: Road, along_m: float) -> Prop:
@@ -53,15 +55,3 @@ def _car(rng: np.random.Generator, road: Road, along_m: float) -> Prop:
 
     x_m, y_m = road.point(along_m, side * from_middle_m)
     return replace(car, x_m=round(x_m, 3), y_m=round(y_m, 3))
-
-
-def _kiosk(rng: np.random.Generator, square: Road) -> Prop:
-    """A kiosk beside the middle of the square, clear of the streets that cross it."""
-    middle_x, middle_y = square.middle
-    sign_x, sign_y = rng.choice([-1.0, 1.0], 2).tolist()
-    aside_x, aside_y = rng.uniform(*ASIDE_M, 2).tolist()
-
-    x_m = middle_x + sign_x * aside_x
-    y_m = middle_y + sign_y * aside_y
-    at_m = (x_m, y_m)
-    return prop_of_kind(rng, "kiosk", at_m, 0.0)

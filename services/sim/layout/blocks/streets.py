@@ -123,7 +123,10 @@ def plan(rng: np.random.Generator, size_m: float) -> Streets:
     missing = _missing(rng, grid.stretches())
     kept = [stretch for stretch in grid.stretches() if stretch not in missing]
 
-    through = [_road(grid, stretch, names) for stretch in kept]
+    through = []
+    for stretch in kept:
+        start, end = (grid.at(crossing) for crossing in stretch)
+        through.append(Road(names.of(stretch), start, end, grid.width_m(stretch)))
     dead_ends = _dead_ends(rng, grid, missing, names)
     square = _square(rng, grid)
 
@@ -171,7 +174,8 @@ class _Names:
 
     def of(self, stretch: Stretch) -> str:
         """The name of a stretch, such as "Elm Street 2"."""
-        kind = _kind(self._grid.width_m(stretch))
+        width_m = self._grid.width_m(stretch)
+        kind = min(WIDTHS_M, key=lambda kind: abs(WIDTHS_M[kind] - width_m))
         return self._numbered(self._grid.line(stretch), kind)
 
     def dead_end(self, number: int) -> str:
@@ -188,16 +192,6 @@ class _Names:
         count = self._used.get(line, 0) + 1
         self._used[line] = count
         return f"{line} {count}"
-
-
-def _kind(width_m: float) -> str:
-    """What a street of this width is called."""
-    return min(WIDTHS_M, key=lambda kind: abs(WIDTHS_M[kind] - width_m))
-
-
-def _road(grid: Grid, stretch: Stretch, names: _Names) -> Road:
-    first, second = stretch
-    return Road(names.of(stretch), grid.at(first), grid.at(second), grid.width_m(stretch))
 
 
 def _missing(rng: np.random.Generator, stretches: list[Stretch]) -> list[Stretch]:
@@ -230,11 +224,12 @@ def _is_spare(stretch: Stretch, others: list[Stretch]) -> bool:
     if not detour:
         return False
 
-    return all(_route(_without(others, closed), start, end) for closed in detour)
+    for closed in detour:
+        rest = [other for other in others if other != closed]
+        if not _route(rest, start, end):
+            return False
 
-
-def _without(stretches: list[Stretch], closed: Stretch) -> list[Stretch]:
-    return [stretch for stretch in stretches if stretch != closed]
+    return True
 
 
 def _route(stretches: list[Stretch], start: Crossing, end: Crossing) -> list[Stretch]:
@@ -277,28 +272,24 @@ def _dead_ends(
         share = float(rng.uniform(*DEAD_END_SHARE))
         first, second = stretch if rng.random() < 0.5 else stretch[::-1]
 
-        end = _between(grid.at(first), grid.at(second), share)
+        start_x, start_y = grid.at(first)
+        end_x, end_y = grid.at(second)
+        x_m = start_x + share * (end_x - start_x)
+        y_m = start_y + share * (end_y - start_y)
+        end = (round(x_m, 1), round(y_m, 1))
         name = names.dead_end(len(roads))
         roads.append(Road(name, grid.at(first), end, ALLEY_M))
 
     for sign in (-1.0, 1.0):
-        start, end = _outward(rng, grid, sign)
+        # From the western (-1) or eastern (1) border.
+        border = 0 if sign < 0 else len(grid.x_m) - 1
+        start = grid.at((border, int(rng.integers(len(grid.y_m)))))
+        start_x, y_m = start
+        end = (round(start_x + sign * float(rng.uniform(*OUTWARD_M)), 1), y_m)
         name = names.dead_end(len(roads))
         roads.append(Road(name, start, end, ALLEY_M))
 
     return roads
-
-
-def _outward(rng: np.random.Generator, grid: Grid, sign: float) -> tuple[Point, Point]:
-    """A stretch from the western (-1) or eastern (1) border out of the town."""
-    border = 0 if sign < 0 else len(grid.x_m) - 1
-    row = int(rng.integers(len(grid.y_m)))
-    start = grid.at((border, row))
-    start_x, y_m = start
-
-    length_m = float(rng.uniform(*OUTWARD_M))
-    end_x = round(start_x + sign * length_m, 1)
-    return start, (end_x, y_m)
 
 
 def _square(rng: np.random.Generator, grid: Grid) -> Road:
@@ -313,12 +304,3 @@ def _square(rng: np.random.Generator, grid: Grid) -> Road:
     east = (x_m + half_line_m, y_m)
 
     return Road(SQUARE_NAME, west, east, width_m)
-
-
-def _between(start: Point, end: Point, share: float) -> Point:
-    start_x, start_y = start
-    end_x, end_y = end
-    x_m = start_x + share * (end_x - start_x)
-    y_m = start_y + share * (end_y - start_y)
-
-    return round(x_m, 1), round(y_m, 1)

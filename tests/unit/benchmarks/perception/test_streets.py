@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from benchmarks.perception import depth, streets
+from benchmarks.perception import streets, towns
 from cogmap.schemas.sensing import Pose
 
 
@@ -15,7 +15,7 @@ def test_depth_is_judged_from_three_to_thirty_metres_where_it_is_known() -> None
     true_m = np.array([[2.0, 10.0, 20.0, 31.0, 0.0, 4.0]], np.float32)
     depth_m = np.array([[1.0, 11.0, 19.0, 60.0, 5.0, 0.0]], np.float32)
 
-    errors, known = depth.errors(depth_m, true_m)
+    errors, known = towns.depth_errors(depth_m, true_m)
 
     np.testing.assert_allclose(errors, [0.1, 0.05], rtol=1e-5)
     assert known == pytest.approx(2 / 3)

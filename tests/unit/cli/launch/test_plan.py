@@ -169,7 +169,7 @@ def test_the_drive_waits_for_every_module_every_worker_and_whoever_watches() -> 
 def test_laps_that_are_not_driven_are_refused(
     choices: Choices, sections: dict[str, dict[str, object]]
 ) -> None:
-    with pytest.raises(ConfigError, match="--laps is of the loop town"):
+    with pytest.raises(ConfigError, match="--laps is for the loop town"):
         configured(choices, **sections)
 
 

@@ -1,4 +1,4 @@
-"""What enters the workspace at the start of a cycle."""
+"""Builds what enters the workspace at the start of a cycle."""
 
 from __future__ import annotations
 
@@ -28,6 +28,27 @@ from cogmap.schemas.nodes import (
 from cogmap.schemas.sensing import Percepts
 from cogmap.services.workspace.config import Config
 
+FIRST_SAMPLES = 200
+"""Samples of the self before anything is known; localization draws as many as it wants."""
+
+RECOGNITION_THRESHOLD = 0.7
+"""A percept enters if its evidence is above this. LIDA: 0.7 of total activation; here of evidence,
+because the map is to be learned from what a view shows, and not from what was expected of it.
+"""
+
+PLACE_DECAY = 0.02
+"""What a place node's activation loses in a cycle. LIDA: 0.1 in a tick; here less, because a place
+is excited only while the agent is at it: those of the last ten seconds stay active.
+"""
+
+FORGET_BELOW = 0.05
+"""A node is forgotten when its total activation falls below this; chosen, not tuned."""
+
+KEPT_BASE_LEVEL = 0.9
+"""A base level that was learned up to this does not decay below it. With much less, objects are
+kept that were seen in a few views from one side: placed badly, they would mislead localization.
+"""
+
 
 def first_operations(graph: Graph, config: Config) -> list[Operation]:
     """The root map, the rates of decay and the self node, as far as the graph lacks them.
@@ -38,9 +59,9 @@ def first_operations(graph: Graph, config: Config) -> list[Operation]:
     rates = Decay(
         activation=config.decay,
         base_level=config.base_level_decay,
-        place_activation=config.place_decay,
-        forget_below=config.forget_below,
-        kept_base_level=config.kept_base_level,
+        place_activation=PLACE_DECAY,
+        forget_below=FORGET_BELOW,
+        kept_base_level=KEPT_BASE_LEVEL,
     )
     if graph.decay != rates:
         operations.append(rates)
@@ -49,15 +70,15 @@ def first_operations(graph: Graph, config: Config) -> list[Operation]:
         operations.append(Map(id=ROOT_MAP, cell_m=config.cell_m))
 
     if graph.agent is None:
-        zeros = np.zeros((config.first_samples, POSE_COLUMNS))
+        zeros = np.zeros((FIRST_SAMPLES, POSE_COLUMNS))
         samples = Matrix.of(zeros)
         operations.append(Self(id=SELF_ID, activation=1.0, base_level=1.0, samples=samples))
     return operations
 
 
 def first_goals(config: Config, before_ns: int, now_ns: int) -> list[Goal]:
-    """The goals that the agent is given by its settings, in their order, where that is due between
-    the view of the cycle before and this one.
+    """The goals that the agent is given by its settings, in their order, if that is due between the
+    view of the cycle before and this one.
     """
     due_ns = round(config.goals_after_s * 1e9)
     if not before_ns < due_ns <= now_ns:
@@ -86,27 +107,26 @@ def check_percepts(percepts: Percepts) -> None:
             raise MessageError(f"{name} points of shape {points_m.shape}")
 
 
-def recognised(percepts: Percepts, threshold: float) -> Percepts:
+def recognised(percepts: Percepts) -> Percepts:
     """`percepts` without the objects for which the view's evidence is not above `threshold`: what
     they are is too uncertain to map by, however much they were expected.
     """
-    objects = [percept for percept in percepts.objects if percept.evidence > threshold]
+    objects = [percept for percept in percepts.objects if percept.evidence > RECOGNITION_THRESHOLD]
     if len(objects) == len(percepts.objects):
         return percepts
     return msgspec.structs.replace(percepts, objects=objects)
 
 
 def expected_operations(
-    graph: Graph, percepts: Percepts, entering: list[Operation], cycle: int, config: Config
+    graph: Graph, percepts: Percepts, entering: list[Operation], cycle: int
 ) -> list[Operation]:
     """`entering`, with the objects of the map that were recognised with the help of what was
     conscious before: they are as active as their percepts, and are not placed anew.
     """
-    threshold = config.recognition_threshold
     excited: dict[str, Object] = {}
     for percept in percepts.objects:
         node = graph.get(Object, object_id(percept.label))
-        is_primed = percept.evidence <= threshold < percept.activation
+        is_primed = percept.evidence <= RECOGNITION_THRESHOLD < percept.activation
         if node is not None and is_primed:
             excited[node.id] = msgspec.structs.replace(
                 node,

@@ -15,44 +15,20 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
 from cogmap.robot import CAMERA_RANGE_M
 from cogmap.schemas.base import (
-    Coordinate,
-    Name,
     PositiveMetres,
     PositiveRadians,
     PositiveShare,
     Share,
 )
 from cogmap.schemas.sensing import Percept, Pose
+from cogmap.services.sim.trajectory import Landmark
 
 NORMAL_MEDIAN = 0.6745
 MIN_RANGE_M = 0.1
 MIN_RANGE_SD_M = 1e-3
 BUILDINGS = 0x9E
-
-
-class Landmark(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A building that perception knows by name."""
-
-    name: Annotated[Name, msgspec.Meta(description="Its name, 1 to 200 characters.")]
-    x_m: Annotated[Coordinate, msgspec.Meta(description="x of its centre, in m, -1e6 to 1e6.")]
-    y_m: Annotated[Coordinate, msgspec.Meta(description="y of its centre, in m, -1e6 to 1e6.")]
-    width_m: Annotated[
-        PositiveMetres, msgspec.Meta(description="Its apparent width, in m, above 0 to 10000.")
-    ] = 10.0
-    height_m: Annotated[
-        PositiveMetres, msgspec.Meta(description="Its apparent height, in m, above 0 to 10000.")
-    ] = 8.0
-    function: Annotated[
-        str,
-        msgspec.Meta(
-            description="What it is used for, as perception knows of one by that name; empty where "
-            "it does not, at most 200 characters.",
-            max_length=200,
-        ),
-    ] = ""
 
 
 class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -151,76 +127,57 @@ class PerceptSim:
         self._places_m = np.array(places, float).reshape(-1, 2)
 
     def in_view(self, pose: Pose) -> list[int]:
-        """The landmarks in the field of view and within range, whatever else may hide them."""
-        errors = self._errors
-        range_m, bearing_rad = self._as_seen_from(pose)
+        """Return the landmarks in the field of view and within range, whatever else may hide
+        them.
+        """
+        x_m, y_m = (self._places_m - (pose.x_m, pose.y_m)).T
+        range_m = np.hypot(x_m, y_m)
+        direction_rad = np.arctan2(y_m, x_m) - pose.heading_rad
+        bearing_rad = np.remainder(direction_rad + np.pi, 2 * np.pi) - np.pi
 
+        errors = self._errors
         is_near = (range_m >= errors.nearest_m) & (range_m <= errors.farthest_m)
         is_ahead = np.abs(bearing_rad) <= errors.field_of_view_rad / 2
         numbers: list[int] = np.flatnonzero(is_near & is_ahead).tolist()
         return numbers
 
-    def _as_seen_from(self, pose: Pose) -> tuple[Floats, Floats]:
-        """Range and bearing of all landmarks, (n,) each."""
-        position_m = (pose.x_m, pose.y_m)
-        x_m, y_m = (self._places_m - position_m).T
-
-        range_m = np.hypot(x_m, y_m)
-        direction_rad = np.arctan2(y_m, x_m) - pose.heading_rad
-        bearing_rad = np.remainder(direction_rad + np.pi, 2 * np.pi) - np.pi
-        return range_m, bearing_rad
-
     def perceive(
         self, pose: Pose, visible: Sequence[int], cut: Collection[int] = ()
     ) -> list[Percept]:
-        """Percepts of the landmarks that are `visible` from `pose`, not whole of those in `cut`; of
-        percepts with one name, the first.
+        """Return percepts of the landmarks that are `visible` from `pose`, not whole of those in
+        `cut`; of percepts with one name, the first.
         """
         errors = self._errors
+        landmarks = self._landmarks
         phantoms_per_object = (1 / errors.precision - 1) * errors.named_phantoms
 
         percepts: dict[str, Percept] = {}
         for number in visible:
             if self._rng.random() < errors.detected:
-                found = self._detection(pose, number, number not in cut)
-                percepts.setdefault(found.label, found)
+                x_m, y_m = self._places_m[number] - (pose.x_m, pose.y_m)
+                bearing_rad = math.remainder(math.atan2(y_m, x_m) - pose.heading_rad, math.tau)
+
+                # By mistake it gets the name of any other.
+                named = number
+                if len(landmarks) > 1 and self._rng.random() >= errors.right_name:
+                    shift = 1 + int(self._rng.integers(len(landmarks) - 1))
+                    named = (number + shift) % len(landmarks)
+
+                label = landmarks[named].name
+                range_m = math.hypot(x_m, y_m)
+                found = self._percept(label, number, range_m, bearing_rad, number not in cut)
+                percepts.setdefault(label, found)
 
             if self._rng.random() < phantoms_per_object:
-                phantom = self._phantom()
-                percepts.setdefault(phantom.label, phantom)
+                phantom = int(self._rng.integers(len(landmarks)))
+                range_m = float(self._rng.uniform(errors.nearest_m, errors.farthest_m))
+                half_rad = errors.field_of_view_rad / 2
+                bearing_rad = float(self._rng.uniform(-half_rad, half_rad))
+
+                label = landmarks[phantom].name
+                percepts.setdefault(label, self._percept(label, phantom, range_m, bearing_rad))
 
         return list(percepts.values())
-
-    def _detection(self, pose: Pose, number: int, whole: bool) -> Percept:
-        """A percept of a landmark that is there, perhaps by another name."""
-        x_m, y_m = self._places_m[number] - (pose.x_m, pose.y_m)
-        range_m = math.hypot(x_m, y_m)
-        direction_rad = math.atan2(y_m, x_m)
-        bearing_rad = math.remainder(direction_rad - pose.heading_rad, math.tau)
-
-        label = self._name(number)
-        return self._percept(label, number, range_m, bearing_rad, whole)
-
-    def _phantom(self) -> Percept:
-        """A percept of a landmark that is not there."""
-        errors = self._errors
-        number = int(self._rng.integers(len(self._landmarks)))
-        range_m = float(self._rng.uniform(errors.nearest_m, errors.farthest_m))
-
-        half_rad = errors.field_of_view_rad / 2
-        bearing_rad = float(self._rng.uniform(-half_rad, half_rad))
-
-        name = self._landmarks[number].name
-        return self._percept(name, number, range_m, bearing_rad)
-
-    def _name(self, number: int) -> str:
-        """The landmark's name or, by mistake, that of any other."""
-        others = len(self._landmarks) - 1
-        if others and self._rng.random() >= self._errors.right_name:
-            shift = 1 + int(self._rng.integers(others))
-            number = (number + shift) % (others + 1)
-
-        return self._landmarks[number].name
 
     def _percept(
         self, label: str, number: int, range_m: float, bearing_rad: float, whole: bool = True

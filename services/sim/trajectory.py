@@ -11,12 +11,33 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import distances_along, nearest_on_line
-from cogmap.schemas.base import Coordinate, PositiveSpeed
+from cogmap.schemas.base import Coordinate, Name, PositiveMetres, PositiveSpeed
 from cogmap.schemas.sensing import Pose
-from cogmap.services.sim.scripted.percepts import Landmark
 
 Leg = tuple[float, float]
 SAME_POINT_M = 1e-6
+
+
+class Landmark(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
+    """A building that perception knows by name."""
+
+    name: Annotated[Name, msgspec.Meta(description="Its name, 1 to 200 characters.")]
+    x_m: Annotated[Coordinate, msgspec.Meta(description="x of its centre, in m, -1e6 to 1e6.")]
+    y_m: Annotated[Coordinate, msgspec.Meta(description="y of its centre, in m, -1e6 to 1e6.")]
+    width_m: Annotated[
+        PositiveMetres, msgspec.Meta(description="Its apparent width, in m, above 0 to 10000.")
+    ] = 10.0
+    height_m: Annotated[
+        PositiveMetres, msgspec.Meta(description="Its apparent height, in m, above 0 to 10000.")
+    ] = 8.0
+    function: Annotated[
+        str,
+        msgspec.Meta(
+            description="What it is used for, as perception knows of one by that name; empty where "
+            "it does not, at most 200 characters.",
+            max_length=200,
+        ),
+    ] = ""
 
 
 class Trajectory(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):

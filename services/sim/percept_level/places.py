@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import PlaceMatch, Pose
-from cogmap.services.sim.scripted.percepts import PerceptErrors
+from cogmap.services.sim.percept_level.percepts import PerceptErrors
 
 MAX_APART_M = 3.0
 MAX_TURN_RAD = 0.35
@@ -29,11 +28,19 @@ class PlaceSim:
         self._similar_frames = 0
 
     def recognize(self, frame: int, stamp_ns: int, pose: Pose) -> list[PlaceMatch]:
-        """The remembered view that this one matches, if any; one near none is remembered."""
+        """Return the remembered view that this one matches, if any; one near none is remembered.
+
+        By mistake the match is any other view.
+        """
         similar = self._similar(frame, pose)
         if similar is None:
             self._similar_frames = 0
-            self._remember(frame, stamp_ns, pose)
+            count = len(self._views)
+            if count == len(self._rows):
+                self._rows = np.vstack([self._rows, np.zeros_like(self._rows)])
+
+            self._rows[count] = (pose.x_m, pose.y_m, pose.heading_rad, frame)
+            self._views.append((frame, stamp_ns))
             return []
 
         self._similar_frames += 1
@@ -43,42 +50,24 @@ class PlaceSim:
         if self._rng.random() >= self._errors.place_recall:
             return []
 
-        return [self._match(similar)]
-
-    def _remember(self, frame: int, stamp_ns: int, pose: Pose) -> None:
-        count = len(self._views)
-        if count == len(self._rows):
-            self._rows = np.vstack([self._rows, np.zeros_like(self._rows)])
-
-        self._rows[count] = (pose.x_m, pose.y_m, pose.heading_rad, frame)
-        self._views.append((frame, stamp_ns))
-
-    def _match(self, similar: int) -> PlaceMatch:
-        """The right view or, by mistake, any other."""
         precision = self._errors.place_precision
         is_right = self._rng.random() < precision
         number = similar if is_right else int(self._rng.integers(len(self._views)))
-
-        frame, view_ns = self._views[number]
-        return PlaceMatch(frame=frame, view_ns=view_ns, score=precision)
+        matched, view_ns = self._views[number]
+        return [PlaceMatch(frame=matched, view_ns=view_ns, score=precision)]
 
     def _similar(self, frame: int, pose: Pose) -> int | None:
-        """The nearest remembered view of about the same place and heading that is not recent."""
+        """Return the nearest remembered view of about the same place and heading that is not
+        recent.
+        """
         if not self._views:
             return None
 
         rows = self._rows[: len(self._views)]
         apart_m = np.hypot(rows[:, 0] - pose.x_m, rows[:, 1] - pose.y_m)
-        is_turned = _turns_rad(rows, pose) > MAX_TURN_RAD
+        turn_rad = np.remainder(rows[:, 2] - pose.heading_rad + np.pi, 2 * np.pi) - np.pi
         is_recent = rows[:, 3] > frame - RECENT_FRAMES
 
-        apart_m[is_turned | is_recent] = np.inf
+        apart_m[(np.abs(turn_rad) > MAX_TURN_RAD) | is_recent] = np.inf
         nearest = int(apart_m.argmin())
         return nearest if apart_m[nearest] <= MAX_APART_M else None
-
-
-def _turns_rad(poses: Floats, pose: Pose) -> Floats:
-    """(n,): the angles between the headings of n poses, one a row, and that of `pose`, 0 to pi."""
-    difference_rad = poses[:, 2] - pose.heading_rad
-    turn_rad = np.remainder(difference_rad + np.pi, 2 * np.pi) - np.pi
-    return np.asarray(np.abs(turn_rad))

@@ -10,13 +10,13 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.geometry.se2 import rotate
-from cogmap.services.sim.driven.camera import ColumnCamera
 from cogmap.services.sim.layout.boundaries import Surfaces
+from cogmap.services.sim.percept_level.column_camera import ColumnCamera
 
 MAX_RANGE_M = 15.0
 CELL_M = 0.5
 POINTS_A_CELL = 2
-# Columns beside a point that must not show anything nearer, where a boundary is claimed.
+# A boundary is claimed if so many columns on both sides of a point show nothing nearer.
 BESIDE_PX = 4
 BORDER_PX = 3
 _CELLS = round(MAX_RANGE_M / CELL_M) + 1
@@ -28,7 +28,10 @@ class Lattice:
     """
 
     def __init__(self, camera: ColumnCamera) -> None:
-        points_m = _square_m()
+        step_m = CELL_M / POINTS_A_CELL
+        at_m = np.arange(step_m / 2 - MAX_RANGE_M, MAX_RANGE_M, step_m)
+        around_m = np.stack(np.meshgrid(at_m, at_m, indexing="ij"), axis=-1)
+        points_m: Floats = around_m.reshape(-1, 2)
         depth_m = points_m[:, 0] - camera.mount.mount_forward_m
         is_ahead = depth_m > nearest_ground_m(camera)
         is_in_range = np.hypot(*points_m.T) <= MAX_RANGE_M
@@ -47,17 +50,6 @@ class Lattice:
     def thinned(self, chosen: Indices) -> Singles:
         """(k, 2): the mean of the chosen points in each cell, in the order of the cells."""
         return _means_m(self.points_m[chosen], self.cell[chosen], self.cells)
-
-
-def _square_m() -> Floats:
-    """(n, 2): points on all sides of the robot."""
-    step_m = CELL_M / POINTS_A_CELL
-    first_m = step_m / 2 - MAX_RANGE_M
-    at_m = np.arange(first_m, MAX_RANGE_M, step_m)
-
-    forward_m, left_m = np.meshgrid(at_m, at_m, indexing="ij")
-    points_m = np.stack([forward_m, left_m], axis=-1)
-    return points_m.reshape(-1, 2)
 
 
 def nearest_ground_m(camera: ColumnCamera) -> float:
@@ -111,7 +103,8 @@ def boundary_points_m(
     is_inside = _is_inside(column, camera.width, BORDER_PX)
     inside_m = ahead_m[is_inside]
 
-    around_m = _least_around(depth_m)
+    padded_m = np.pad(depth_m, BESIDE_PX, mode="edge")
+    around_m = sliding_window_view(padded_m, 2 * BESIDE_PX + 1).min(axis=1)
     number = np.rint(column[is_inside]).astype(np.int64)
     is_visible = inside_m[:, 0] < around_m[number]
 
@@ -122,13 +115,6 @@ def boundary_points_m(
 
 def _is_inside(column: Floats, width: int, border: float = 0.0) -> Booleans:
     return np.asarray((column >= border) & (column <= width - 1 - border))
-
-
-def _least_around(depth_m: Floats) -> Floats:
-    """(width,): the least depth within BESIDE_PX columns of each."""
-    padded_m = np.pad(depth_m, BESIDE_PX, mode="edge")
-    least_m: Floats = sliding_window_view(padded_m, 2 * BESIDE_PX + 1).min(axis=1)
-    return least_m
 
 
 def thin(points_m: Floats) -> Singles:

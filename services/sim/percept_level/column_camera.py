@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import transform_to
 from cogmap.schemas.sensing import Calibration
 
@@ -67,67 +67,32 @@ class ColumnCamera:
         return robot_m
 
     def nearest(self, pose: Floats, segments_m: Floats) -> Buffer:
-        """The nearest of (n, 4) segments in each column."""
+        """Return the nearest of (n, 4) segments in each column."""
         ends_m = self.seen_from(pose, segments_m.reshape(-1, 2, 2))
-        numbers = np.flatnonzero(self._may_be_seen(ends_m))
-        if not len(numbers):
-            return self._empty()
 
-        inverse_m = self._inverse_depths(ends_m[numbers])
-        best = inverse_m.argmax(axis=0)
-        columns = np.arange(self.width)
-        nearest = inverse_m[best, columns]
-
-        segment = np.where(nearest > 0.0, numbers[best], NOTHING)
-        return Buffer(nearest, segment)
-
-    def _empty(self) -> Buffer:
-        nothing = np.full(self.width, NOTHING)
-        return Buffer(np.zeros(self.width), nothing)
-
-    def _may_be_seen(self, ends_m: Floats) -> Booleans:
-        """(n,): which of (n, 2, 2) segments have a part before the camera, and not both ends beyond
-        the same side of the image.
-        """
+        # They have a part before the camera, and not both ends beyond the same side of the image.
         forward_m = ends_m[..., 0]
         left_m = ends_m[..., 1]
-
+        beyond_left = (left_m > self.left_slope[0] * forward_m).all(axis=1)
+        beyond_right = (left_m < self.left_slope[-1] * forward_m).all(axis=1)
         is_before = (forward_m > NEAR_M).any(axis=1)
+        numbers = np.flatnonzero(is_before & ~(beyond_left | beyond_right))
+        if not len(numbers):
+            return Buffer(np.zeros(self.width), np.full(self.width, NOTHING))
 
-        left_border_m = self.left_slope[0] * forward_m
-        right_border_m = self.left_slope[-1] * forward_m
-        beyond_left = (left_m > left_border_m).all(axis=1)
-        beyond_right = (left_m < right_border_m).all(axis=1)
-
-        is_beside = beyond_left | beyond_right
-        return np.asarray(is_before & ~is_beside)
-
-    def _inverse_depths(self, ends_m: Floats) -> Floats:
-        """(n, width): the inverse depth of (n, 2, 2) segments in each column, 0 where they are not
-        seen.
-        """
-        clipped_m = _before_camera(ends_m)
+        clipped_m = _before_camera(ends_m[numbers])
         at_axis, by_slope = _inverse_depth_of_lines(clipped_m)
         inverse_m: Floats = at_axis[:, None] + by_slope[:, None] * self.left_slope
 
-        is_outside = self._is_outside(clipped_m)
-        inverse_m[is_outside] = 0.0
-        return inverse_m
+        slopes = clipped_m[..., 1] / clipped_m[..., 0]
+        is_right = self.left_slope < slopes.min(axis=1)[:, None]
+        is_left = self.left_slope > slopes.max(axis=1)[:, None]
+        inverse_m[is_right | is_left] = 0.0
 
-    def _is_outside(self, ends_m: Floats) -> Booleans:
-        """(n, width): which columns lie beside (n, 2, 2) segments, whose ends are before the
-        camera.
-        """
-        forward_m = ends_m[..., 0]
-        left_m = ends_m[..., 1]
-
-        slopes = left_m / forward_m
-        lowest = slopes.min(axis=1)
-        highest = slopes.max(axis=1)
-
-        is_right = self.left_slope < lowest[:, None]
-        is_left = self.left_slope > highest[:, None]
-        return np.asarray(is_right | is_left)
+        best = inverse_m.argmax(axis=0)
+        nearest = inverse_m[best, np.arange(self.width)]
+        segment = np.where(nearest > 0.0, numbers[best], NOTHING)
+        return Buffer(nearest, segment)
 
 
 def _inverse_depth_of_lines(ends_m: Floats) -> tuple[Floats, Floats]:

@@ -10,7 +10,7 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.robot import CAMERA_RANGE_M
 from cogmap.services.sim.layout.barriers import barriers
-from cogmap.services.sim.layout.boundaries import Surfaces, outlines, surfaces
+from cogmap.services.sim.layout.boundaries import Surfaces, outlines, points_along, surfaces
 from cogmap.services.sim.layout.place import Place
 
 GROUND_REACH_M = 16.0
@@ -50,7 +50,7 @@ class Surroundings:
         self._seen_props_m = outlines(seen)
         self._solid_props_m = outlines(solid)
 
-        self._kerbs_m = _points_along(place.kerbs_m)
+        self._kerbs_m = points_along(place.kerbs_m, KERB_STEP_M)
         self._streets = surfaces(place.roads)
         self._barriers = barriers(place.roads)
         self._closing_m = outlines([])
@@ -58,19 +58,17 @@ class Surroundings:
         self._middle_m: tuple[float, float] | None = None
         self._near = self._search(place.start.x_m, place.start.y_m)
 
-    def close(self, names: Collection[str]) -> None:
-        """Let barriers close these streets, and no others."""
-        closing = [self._barriers[name].solid for name in sorted(names)]
+    def change(self, closed: Collection[str], gone: Collection[int]) -> None:
+        """Let barriers close these streets, and these buildings be gone, and no others."""
+        closing = [self._barriers[name].solid for name in sorted(closed)]
         self._closing_m = outlines(closing)
-        self._middle_m = None
-
-    def remove(self, buildings: Collection[int]) -> None:
-        """Let these buildings be gone, and no others."""
-        self._is_standing = ~np.isin(self._plots, sorted(buildings))
+        self._is_standing = ~np.isin(self._plots, sorted(gone))
         self._middle_m = None
 
     def near(self, x_m: float, y_m: float) -> Near:
-        """What is within the camera's range of a place, and of the ground within GROUND_REACH_M."""
+        """Return what is within the camera's range of a place, and of the ground within
+        GROUND_REACH_M.
+        """
         middle_m = self._middle_m
         if middle_m is None or np.hypot(middle_m[0] - x_m, middle_m[1] - y_m) > MOVED_M:
             self._middle_m = (x_m, y_m)
@@ -88,29 +86,19 @@ class Surroundings:
         solid_m = np.vstack([walls_m, self._solid_props_m, self._closing_m])
         is_solid = _within(solid_m, x_m, y_m, BODY_REACH_M + MOVED_M)
 
+        kerb_m = np.hypot(*(self._kerbs_m - (x_m, y_m)).T)
+        streets = self._streets
+        street_m = np.hypot(*(streets.middle_m - (x_m, y_m)).T)
+        street_m -= streets.half_length_m + streets.half_width_m
+
         return Near(
             walls_m=walls_m[is_wall],
             plot=self._plots[self._is_standing][is_wall],
             obstacles_m=seen_m[is_seen],
             solid_m=solid_m[is_solid],
-            kerbs_m=self._near_kerbs_m(x_m, y_m),
-            streets=self._near_streets(x_m, y_m),
+            kerbs_m=self._kerbs_m[kerb_m <= GROUND_REACH_M + MOVED_M],
+            streets=streets.chosen(street_m <= GROUND_REACH_M + MOVED_M),
         )
-
-    def _near_kerbs_m(self, x_m: float, y_m: float) -> Floats:
-        away_m = self._kerbs_m - (x_m, y_m)
-        range_m = np.hypot(away_m[:, 0], away_m[:, 1])
-        near_m: Floats = self._kerbs_m[range_m <= GROUND_REACH_M + MOVED_M]
-        return near_m
-
-    def _near_streets(self, x_m: float, y_m: float) -> Surfaces:
-        streets = self._streets
-        away_m = streets.middle_m - (x_m, y_m)
-        range_m = np.hypot(away_m[:, 0], away_m[:, 1])
-
-        half_m = streets.half_length_m + streets.half_width_m
-        nearest_m = range_m - half_m
-        return streets.chosen(nearest_m <= GROUND_REACH_M + MOVED_M)
 
 
 def _within(segments_m: Floats, x_m: float, y_m: float, reach_m: float) -> Booleans:
@@ -128,23 +116,3 @@ def _within(segments_m: Floats, x_m: float, y_m: float, reach_m: float) -> Boole
     ends_behind = high_m >= at_m - reach_m
     is_near = begins_before & ends_behind
     return np.asarray(is_near.all(axis=1))
-
-
-def _points_along(segments_m: Floats) -> Floats:
-    """(k, 2): points along (n, 4) segments, KERB_STEP_M apart at most."""
-    starts_m = segments_m[:, :2]
-    along_m = segments_m[:, 2:] - starts_m
-    lengths_m = np.hypot(along_m[:, 0], along_m[:, 1])
-
-    needed = np.ceil(lengths_m / KERB_STEP_M)
-    counts = needed.astype(int).clip(1)
-    firsts = np.cumsum(counts) - counts
-
-    # Of each point: the number of its segment, and its place among the points of that one.
-    segment = np.repeat(np.arange(len(segments_m)), counts)
-    place = np.arange(len(segment)) - firsts[segment]
-    share = (place + 0.5) / counts[segment]
-
-    offset_m = share[:, None] * along_m[segment]
-    points_m: Floats = starts_m[segment] + offset_m
-    return points_m
