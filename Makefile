@@ -4,7 +4,7 @@ INSTALLED := .venv/installed
 TRAINS := .venv/trains
 MEASURES := .venv/measures
 
-.PHONY: help setup train-setup bench-setup demo test test-compose lint bench release clean
+.PHONY: help setup train-setup bench-setup demo test test-compose lint generated bench release clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -54,6 +54,11 @@ lint: setup ## style, types, and which package imports which; needs no torch
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+generated: setup ## what follows from the code: golden messages, tables and code in the docs
+	$(BIN)/python -m cogmap.schemas.export --golden schemas/golden
+	$(BIN)/cogmap architecture
+	$(BIN)/python -m tests.support.includes
 
 bench: bench-setup ## every benchmark and experiment that has a threshold; make bench ARGS="--data DIR"
 	$(BIN)/python -m benchmarks all $(ARGS)

@@ -15,7 +15,7 @@ MAX_DIMENSIONS = 4
 
 
 def _check(dtype: str, shape: tuple[int, ...], data: memoryview | bytes) -> None:
-    """Raise ValueError where the parts of an array do not fit together, or it is not finite."""
+    """Raise ValueError if the parts of an array do not fit together, or it is not finite."""
     expected = _ITEM_BYTES.get(dtype, 0)
     if not expected:
         known = ", ".join(sorted(_ITEM_BYTES))
@@ -57,7 +57,7 @@ class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
         return cls(array.dtype.str, array.shape, content.data)
 
     def numpy(self) -> npt.NDArray[np.generic]:
-        """The values, read-only, sharing memory with the message."""
+        """Return the values, read-only, sharing memory with the message."""
         array = np.frombuffer(self.data, self.dtype).reshape(self.shape)
         array.flags.writeable = False
         return array
@@ -97,6 +97,6 @@ class Matrix(msgspec.Struct, frozen=True, gc=False):
         return cls(dtype, (rows, columns), array.tobytes())
 
     def numpy(self) -> npt.NDArray[np.float64]:
-        """The values, read-only, sharing memory with the matrix, of its dtype."""
+        """Return the values, read-only, sharing memory with the matrix, of its dtype."""
         values = np.frombuffer(self.data, self.dtype)
         return values.reshape(self.shape)

@@ -52,7 +52,7 @@ class RouteReplay(Message, kw_only=True, frozen=True, tag="route_replay"):
     """A route replayed by place cells before a run or after it (paper §5.5, §5.6).
 
     `cells` int32 (n, 2) are the place nodes of map `map` in the order in which they are active;
-    `goal` is the id of the goal, empty where the agent explores.
+    `goal` is the id of the goal, empty if the agent explores.
     """
 
     cycle: Count
@@ -104,7 +104,7 @@ class Coalitions(Message, kw_only=True, frozen=True):
 
 
 class Trigger(enum.StrEnum):
-    """The condition that led to a broadcast (LIDA's four triggers); NONE where none was met."""
+    """The condition that led to a broadcast (LIDA's four triggers); NONE if none was met."""
 
     NONE = ""
     ONE_COALITION = "one coalition over threshold"
@@ -114,7 +114,7 @@ class Trigger(enum.StrEnum):
 
 
 class Silence(enum.StrEnum):
-    """Why a competition led to no broadcast; NONE where it led to one.
+    """Why a competition led to no broadcast; NONE if it led to one.
 
     NO_COALITION: none competed. REFRACTORY: the last broadcast was too short a time ago.
     NO_TRIGGER: no trigger's condition was met.
@@ -220,7 +220,7 @@ class Behaviour(Part, kw_only=True, frozen=True):
 
     `bindings` are the ids of the nodes that the variables of its patterns stand for; `parameters`
     are those of `action`. The patterns of `context` have the activation of the node that each is
-    matched by, 0 where none is; those of `adding` have their salience. `reliability` is the share
+    matched by, 0 if none is; those of `adding` have their salience. `reliability` is the share
     of its `executions` that were `successes`. `gathered` is the part of its activation that came
     from the behaviour net.
     """
@@ -271,7 +271,7 @@ class Behaviours(Message, kw_only=True, frozen=True):
 
 class Action(Message, kw_only=True, frozen=True):
     """The scheme that action selection chose for the broadcast of `cycle`, and its action for the
-    sensory-motor memory. `scheme` and `action` are empty where no behaviour was active enough: the
+    sensory-motor memory. `scheme` and `action` are empty if no behaviour was active enough: the
     action before continues.
 
     `behaviours` are all that were considered, the chosen one included. `threshold` is the

@@ -2,7 +2,8 @@
 
 `python -m cogmap.schemas.export DIR` writes a JSON Schema for every topic.
 
-With `--golden` it writes the golden bytes instead, which is how they are changed on purpose:
+With `--golden` it writes the golden bytes instead, completed by what they lack of a new topic,
+field or kind of node, which is how they are changed on purpose:
 `python -m cogmap.schemas.export --golden schemas/golden`. JSON Schema has no bytes: `data` of an
 array, a base64 string there, is msgpack's bin.
 """
@@ -19,17 +20,9 @@ from cogmap.schemas import topics
 from cogmap.schemas.examples import example_messages
 from cogmap.schemas.topics import Topic
 
-GOLDEN = Path(__file__).parent / "golden"
-
-
-def file_name(topic: Topic, suffix: str) -> str:
-    """The name of a file about `topic`."""
-    stem = topic.name.replace("/", ".")
-    return stem + suffix
-
 
 def json_schema(topic: Topic) -> dict[str, Any]:
-    """The JSON Schema (2020-12) of what `topic` carries."""
+    """Return the JSON Schema (2020-12) of what `topic` carries."""
     about = {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "$id": f"cogmap/{topic.name}",
@@ -38,23 +31,20 @@ def json_schema(topic: Topic) -> dict[str, Any]:
 
 
 def export_schemas(folder: Path) -> list[Path]:
-    """Write a JSON Schema for every topic into `folder`; the files written."""
+    """Write a JSON Schema for every topic into `folder`, and return the files written."""
     files = {}
     for topic in topics.ALL:
-        compact = msgspec.json.encode(json_schema(topic))
-        text = msgspec.json.format(compact)
-        files[file_name(topic, ".json")] = text + b"\n"
-
+        text = msgspec.json.format(msgspec.json.encode(json_schema(topic)))
+        files[f"{topic.file_stem}.json"] = text + b"\n"
     return _write(folder, files)
 
 
 def export_golden(folder: Path) -> list[Path]:
-    """Write the bytes of one message of every type into `folder`; the files written."""
+    """Write the bytes of one message of every type into `folder`, and return the files written."""
     files = {}
     for message in example_messages():
-        name = file_name(topics.of(message), ".msgpack")
+        name = f"{topics.of(message).file_stem}.msgpack"
         files[name] = msgspec.msgpack.encode(message)
-
     return _write(folder, files)
 
 
@@ -62,7 +52,6 @@ def _write(folder: Path, files: dict[str, bytes]) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         (folder / name).write_bytes(content)
-
     return [folder / name for name in files]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 
 class Feeling(enum.StrEnum):
-    """What the agent feels about the content of a coalition; NONE where it feels nothing.
+    """What the agent feels about the content of a coalition; NONE if it feels nothing.
 
     NOVELTY: it is new. SURPRISE: it was expected to be otherwise. NEED: it is needed, or satisfies
     a need. DANGER: the agent may run into something. LOST: the agent does not know where it is.
@@ -25,8 +25,8 @@ UNPLEASANT = frozenset({Feeling.SURPRISE, Feeling.DANGER, Feeling.LOST})
 
 
 def salience_of(feelings: Mapping[Feeling, float]) -> float:
-    """The salience of what `feelings` are attached to, each with its activation, 0 to 1: that of
-    the most active one, below 0 where it is unpleasant; 0 without any.
+    """Return the salience of what `feelings` are attached to, each with its activation, 0 to 1:
+    that of the most active one, below 0 if it is unpleasant; 0 without any.
 
     Of equals the one that comes first in Feeling counts.
     """

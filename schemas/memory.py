@@ -124,10 +124,10 @@ class Restored(Message, kw_only=True, frozen=True):
 
 
 def tile_key(map_name: str, x: int, y: int) -> str:
-    """The key of the record of a square of a map's place nodes."""
+    """Return the key of the record of a square of a map's place nodes."""
     return f"{map_name}/tile/{x}/{y}"
 
 
 def kind_of_record(record: StoredRecord) -> str:
-    """The name of a record's kind, as it travels."""
+    """Return the name of a record's kind, as it travels."""
     return str(type(record).__struct_config__.tag)

@@ -68,7 +68,7 @@ class SelfMotion(Message, kw_only=True, frozen=True):
 
 class Energy(Message, kw_only=True, frozen=True):
     """What the body senses of its energy at the stamp of a view: the level, 1 where the battery is
-    full and 0 where the robot is out, and whether it is being charged.
+    full and 0 if the robot is out, and whether it is being charged.
     """
 
     frame: Count
@@ -129,12 +129,12 @@ class Percept(Part, kw_only=True, frozen=True):
 
     @property
     def has_bearing(self) -> bool:
-        """Whether the bearing is known: its standard deviation is below a half turn."""
+        """True if the bearing is known: its standard deviation is below a half turn."""
         return self.bearing_sd_rad < math.pi
 
     @property
     def has_range(self) -> bool:
-        """Whether the range is known: its standard deviation is below the range."""
+        """True if the range is known: its standard deviation is below the range."""
         return self.range_sd_m < self.range_m
 
 
@@ -206,7 +206,7 @@ class Associations(Part, kw_only=True, frozen=True):
 
 class Learned(Message, kw_only=True, frozen=True):
     """What perception learned from one view and the broadcasts before it, or, after a restart, from
-    all before. `associations` are None where they were not published anew.
+    all before. `associations` are None if they were not published anew.
     """
 
     frame: Count
@@ -216,7 +216,7 @@ class Learned(Message, kw_only=True, frozen=True):
 
 
 class SpeedLimit(enum.StrEnum):
-    """What keeps the robot below its cruising speed; NONE where nothing does.
+    """What keeps the robot below its cruising speed; NONE if nothing does.
 
     POSE_AGE: the pose that the command is computed from is old, as the machine is too slow. STUCK:
     the robot was commanded to move and did not. AT_GOAL: every goal is reached. OTHER is for

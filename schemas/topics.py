@@ -36,7 +36,7 @@ class Scope(enum.Enum):
 
 @dataclass(frozen=True, eq=False)
 class Topic:
-    """A row of the table: `rate_hz` as in the default configuration, 0 where it depends on what
+    """A row of the table: `rate_hz` as in the default configuration, 0 if it depends on what
     happens.
 
     Latency is counted from the messages that are `sensed`: they derive from the world, not from
@@ -53,8 +53,13 @@ class Topic:
     sensed: bool = False
 
     def key(self, agent: str) -> str:
-        """The Zenoh key expression of this topic for `agent`."""
+        """Return the Zenoh key expression of this topic for `agent`."""
         return f"cogmap/{agent}/{self.name}"
+
+    @property
+    def file_stem(self) -> str:
+        """The name of a file about this topic, without a suffix."""
+        return self.name.replace("/", ".")
 
 
 _LATEST = Delivery.LATEST_WINS
@@ -110,5 +115,5 @@ BY_TYPE: dict[type[Message], Topic] = {topic.type: topic for topic in ALL}
 
 
 def of(message: Message) -> Topic:
-    """The topic that `message` travels on: there is one for each type."""
+    """Return the topic that `message` travels on: there is one for each type."""
     return BY_TYPE[type(message)]

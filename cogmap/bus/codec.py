@@ -22,7 +22,7 @@ class Envelope(msgspec.Struct, array_like=True):
 
     A message is identified by `source`, `incarnation` (when that source was started, ns of wall
     time) and `seq`, its number on its topic. `earlier` counts the messages of that topic that the
-    source published in earlier incarnations, UNKNOWN where it keeps no count: with it a receiver
+    source published in earlier incarnations, UNKNOWN if it keeps no count: with it a receiver
     notices what was lost before a restart.
 
     `born_ns` is the wall time of the sensing, `sent_ns` of the publishing. `stages` are the modules
@@ -68,14 +68,14 @@ def _decoder(kind: type[Message]) -> msgspec.msgpack.Decoder[Message]:
 
 
 def encode(message: msgspec.Struct) -> bytes:
-    """The msgpack bytes of a message or an envelope."""
+    """Return the msgpack bytes of a message or an envelope."""
     return _encoder.encode(message)
 
 
 def decode(topic: Topic, payload: bytes | memoryview) -> Message:
-    """The message in `payload`, validated.
+    """Return the message in `payload`, validated.
 
-    Raises MessageError that names the topic, what was expected and where.
+    Raises MessageError that names the topic, what was expected and if.
     """
     if len(payload) > topic.max_bytes:
         raise MessageError(
@@ -88,7 +88,7 @@ def decode(topic: Topic, payload: bytes | memoryview) -> Message:
 
 
 def decode_envelope(data: bytes | memoryview | None) -> Envelope:
-    """The envelope in a Zenoh attachment. Raises MessageError where there is none."""
+    """Return the envelope in a Zenoh attachment. Raises MessageError if there is none."""
     if data is None:
         raise MessageError("no envelope")
     try:

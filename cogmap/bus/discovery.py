@@ -1,4 +1,4 @@
-"""Which process publishes, subscribes and answers what, as the processes themselves announce it.
+"""Discovers which process publishes, subscribes to and answers what, as each announces it itself.
 
 Each announces its name and each of its uses by a liveliness token. The router's admin space, which
 would tell the same, is not asked: it answers under the lock of the routing tables, and a query that
@@ -7,7 +7,7 @@ meets a declaration stops the router for good (eclipse-zenoh/zenoh#2619).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import Enum
 
@@ -34,7 +34,7 @@ class Role(Enum):
     ANSWERS = "queryable"
 
 
-_ROLES = {role.value: role for role in Role}
+ROLES = {role.value: role for role in Role}
 
 
 @dataclass(frozen=True, order=True)
@@ -68,7 +68,7 @@ class System:
     uses: tuple[Use, ...]
 
     def doing(self, role: Role, topic: Topic) -> list[Process]:
-        """The processes with that role on `topic`, by name."""
+        """Return the processes with that role on `topic`, by name."""
         found = set()
         for use in self.uses:
             if use.role is role and use.topic_name == topic.name:
@@ -76,7 +76,7 @@ class System:
         return sorted(found, key=_by_name)
 
     def topics(self) -> list[Topic]:
-        """The topics that some process has a role on, in the order of the table."""
+        """Return the topics that some process has a role on, in the order of the table."""
         return [topic for topic in topics.ALL if any(self.doing(role, topic) for role in Role)]
 
     def unknown_topics(self) -> list[str]:
@@ -86,12 +86,12 @@ class System:
 
 
 def identity_key(agent: str, zid: str, member: Member) -> str:
-    """The key of the liveliness token that names session `zid`."""
+    """Return the key of the liveliness token that names session `zid`."""
     return f"cogmap/{agent}/@session/{zid}/{member.module}/{member.instance}"
 
 
 def use_key(agent: str, zid: str, role: str, topic_name: str) -> str:
-    """The key of the liveliness token of what session `zid` does on a topic."""
+    """Return the key of the liveliness token of what session `zid` does on a topic."""
     return f"cogmap/{agent}/@use/{zid}/{role}/{topic_name}"
 
 
@@ -109,7 +109,7 @@ def announce_use(
 
 
 def discover(session: zenoh.Session, agent: str) -> System:
-    """What `agent`'s processes do at this moment."""
+    """Return what `agent`'s processes do at this moment."""
     every_member = Member("*", "*")
     return read(
         agent,
@@ -133,7 +133,7 @@ def read(
     ready: Iterable[str] = (),
     own_zid: str = NO_ZID,
 ) -> System:
-    """The system that the keys of liveliness tokens describe, without the session `own_zid`.
+    """Return the system that the keys of liveliness tokens describe, without the session `own_zid`.
 
     A member that is ready and does not name its session, as one in another language may, is a
     process too.
@@ -143,7 +143,13 @@ def read(
         *_, zid, module, instance = token.split("/")
         members[zid] = Member(module, instance)
 
-    uses = {use for use in _uses(used, members) if use.process.zid != own_zid}
+    uses = set()
+    for token in used:
+        *_, zid, word, topic_name = token.split("/", USE_PARTS)
+        role = ROLES.get(word)
+        if role is not None and zid != own_zid:
+            uses.add(Use(topic_name, role, Process(zid, members.get(zid))))
+
     processes = {use.process for use in uses}
     for zid, member in members.items():
         if zid != own_zid:
@@ -159,14 +165,6 @@ def read(
         tuple(sorted(processes, key=_by_name)),
         tuple(sorted(uses, key=lambda use: (use.topic_name, use.role.value, use.process.zid))),
     )
-
-
-def _uses(tokens: Iterable[str], members: dict[str, Member]) -> Iterator[Use]:
-    for token in tokens:
-        *_, zid, word, topic_name = token.split("/", USE_PARTS)
-        role = _ROLES.get(word)
-        if role is not None:
-            yield Use(topic_name, role, Process(zid, members.get(zid)))
 
 
 def _by_name(process: Process) -> tuple[str, str]:

@@ -16,7 +16,7 @@ Job = Callable[[], None]
 
 @dataclass(slots=True)
 class Arrival:
-    """One received message: still bytes, the envelope None where it could not be decoded."""
+    """One received message: still bytes, the envelope None if it could not be decoded."""
 
     topic: Topic
     payload: bytes | memoryview

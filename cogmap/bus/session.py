@@ -34,7 +34,7 @@ _NAME = re.compile(r"[\w.-]+")
 
 
 def check_name(option: str, name: str) -> None:
-    """Raise UsageError where `name`, given by `option`, cannot be part of a key expression."""
+    """Raise UsageError if `name`, given by `option`, cannot be part of a key expression."""
     if not _NAME.fullmatch(name):
         raise UsageError(
             f"{option} {name!r}: use letters, digits, '.', '-' and '_' only, such as robot-1"
@@ -42,19 +42,20 @@ def check_name(option: str, name: str) -> None:
 
 
 def ready_key(agent: str, member: Member) -> str:
-    """The key of the liveliness token by which `member` announces that it is ready."""
+    """Return the key of the liveliness token by which `member` announces that it is ready."""
     return f"cogmap/{agent}/@ready/{member.module}/{member.instance}"
 
 
 def free_endpoint() -> str:
-    """An endpoint on this machine where nothing listens."""
+    """Return an endpoint on this machine where nothing listens."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Session:
-    """A session with the router at `endpoint`. Raises NoRouterError if none answers in time.
+    """Return a session with the router at `endpoint`. Raises NoRouterError if none answers in
+    time.
 
     Until something listens there, Ctrl-C ends the wait at once.
     """
@@ -95,7 +96,7 @@ def _await_listener(endpoint: str, timeout_s: float) -> float:
 
 
 def open_router(endpoint: str) -> zenoh.Session:
-    """A router that listens at `endpoint`. Raises PortInUseError where something else does."""
+    """Return a router that listens at `endpoint`. Raises PortInUseError if something else does."""
     check_free(endpoint)
     settings: dict[str, object] = {
         "listen/endpoints": [endpoint],
@@ -106,7 +107,7 @@ def open_router(endpoint: str) -> zenoh.Session:
 
 
 def check_free(endpoint: str) -> None:
-    """Raise PortInUseError where something listens at `endpoint` already, or nothing can."""
+    """Raise PortInUseError if something listens at `endpoint` already, or nothing can."""
     host, port = _address(endpoint)
     with socket.socket() as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -138,7 +139,7 @@ def _config(mode: str, **settings: object) -> zenoh.Config:
 
 
 def _address(endpoint: str) -> tuple[str, int]:
-    """Host and port. Raises UsageError where `endpoint` is not one of TCP."""
+    """Host and port. Raises UsageError if `endpoint` is not one of TCP."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
     is_port = port.isdecimal() and int(port) <= MAX_PORT

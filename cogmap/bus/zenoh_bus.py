@@ -40,7 +40,7 @@ class _Closable(Protocol):
 class ZenohBus:
     """Connects to the router at `endpoint` as `agent`.
 
-    Raises NoRouterError where none answers in time, and UsageError for a name that cannot be part
+    Raises NoRouterError if none answers in time, and UsageError for a name that cannot be part
     of a key.
     """
 
@@ -207,7 +207,9 @@ class ZenohBus:
 
 
 def encoding(topic: Topic) -> zenoh.Encoding:
-    """What a sample of `topic` holds, for storages and viewers: `application/msgpack;Odometry`."""
+    """Return what a sample of `topic` holds, for storages and viewers:
+    `application/msgpack;Odometry`.
+    """
     return zenoh.Encoding(f"application/msgpack;{topic.type.__name__}")
 
 
@@ -222,7 +224,7 @@ def _priority(topic: Topic) -> zenoh.Priority:
 
 
 def _envelope(sample: zenoh.Sample) -> Envelope | None:
-    """The envelope in a sample's attachment, None where there is none that can be decoded."""
+    """The envelope in a sample's attachment, None if there is none that can be decoded."""
     if sample.attachment is None:
         return None
     try:

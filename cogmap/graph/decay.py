@@ -14,7 +14,7 @@ _MAX_AGE = 2**40
 
 
 def activation(node: GraphNode, cycle: int, decay: Decay) -> float:
-    """A node's activation in `cycle`."""
+    """Return a node's activation in `cycle`."""
     if KINDS[type(node)].persistent:
         return node.activation
 
@@ -23,7 +23,7 @@ def activation(node: GraphNode, cycle: int, decay: Decay) -> float:
 
 
 def base_level(node: GraphNode, cycle: int, decay: Decay) -> float:
-    """A node's base-level activation in `cycle`. One that has reached what is kept decays no
+    """Return a node's base-level activation in `cycle`. One that has reached what is kept decays no
     further than to that.
     """
     if KINDS[type(node)].persistent:
@@ -43,7 +43,7 @@ def total_activation(node: GraphNode, cycle: int, decay: Decay) -> float:
 
 
 def cycle_of_forgetting(node: GraphNode, decay: Decay) -> int:
-    """The cycle at whose end a node is forgotten: in the next it would be below threshold.
+    """Return the cycle at whose end a node is forgotten: in the next it would be below threshold.
 
     NEVER for a node that stays.
     """

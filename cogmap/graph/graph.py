@@ -74,7 +74,7 @@ class Graph:
     def apply(self, delta: Delta) -> bool:
         """Carry out the next commit.
 
-        False where it is not the next one: an old one changes nothing, and a gap remains.
+        False if it is not the next one: an old one changes nothing, and a gap remains.
         """
         if delta.version != self.version + 1:
             return False
@@ -110,12 +110,14 @@ class Graph:
         return node if isinstance(node, Self) else None
 
     def get(self, kind: type[K], identifier: str) -> K | None:
-        """The node of that kind and id; None where there is none."""
+        """Return the node of that kind and id; None if there is none."""
         node = self.nodes.get(identifier)
         return node if isinstance(node, kind) else None
 
     def of_kind(self, kind: type[K]) -> Iterator[K]:
-        """All nodes of a kind, by id. Of a kind that is not indexed it searches every node."""
+        """Return all nodes of a kind, by id. Of a kind that is not indexed it searches
+        every node.
+        """
         names = self._by_kind.get(kind, self.nodes)
 
         for name in sorted(names):
@@ -124,7 +126,7 @@ class Graph:
                 yield node
 
     def count(self, kind: type[GraphNode]) -> int:
-        """How many nodes of an indexed kind there are."""
+        """Return how many nodes of an indexed kind there are."""
         return len(self._by_kind[kind])
 
     @property
@@ -138,26 +140,26 @@ class Graph:
         return max(self.of_kind(PathSegment), key=attrgetter("number"), default=None)
 
     def cell_m(self, map_id: str = ROOT_MAP) -> float:
-        """The distance between neighbouring place nodes of a map."""
+        """Return the distance between neighbouring place nodes of a map."""
         node = self.get(Map, map_id)
         if node is None:
             return 1.0
         return node.cell_m
 
     def activation(self, node: GraphNode) -> float:
-        """A node's activation in the current cycle."""
+        """Return a node's activation in the current cycle."""
         return decay.activation(node, self.cycle, self.decay)
 
     def base_level(self, node: GraphNode) -> float:
-        """A node's base-level activation in the current cycle."""
+        """Return a node's base-level activation in the current cycle."""
         return decay.base_level(node, self.cycle, self.decay)
 
     def total_activation(self, node: GraphNode) -> float:
-        """A node's total activation in the current cycle."""
+        """Return a node's total activation in the current cycle."""
         return decay.total_activation(node, self.cycle, self.decay)
 
     def place(self, i: int, j: int, map_id: str = ROOT_MAP) -> Place | None:
-        """The place node of a cell; None where its tile does not exist."""
+        """Return the place node of a cell; None if its tile does not exist."""
         return self.places.place(
             map_id,
             i,
@@ -168,11 +170,11 @@ class Graph:
         )
 
     def place_links(self, i: int, j: int, map_id: str = ROOT_MAP) -> Iterator[Link]:
-        """The links from a place node to its neighbours."""
+        """Return the links from a place node to its neighbours."""
         return self.places.links(map_id, i, j)
 
     def snapshot(self) -> Snapshot:
-        """Everything, in an order that depends on the content alone.
+        """Return everything, in an order that depends on the content alone.
 
         Its tiles share memory with the graph: encode it before the graph changes.
         """
@@ -201,7 +203,7 @@ class Graph:
         self.phase = snapshot.phase
 
     def digest(self) -> str:
-        """A hash of the content: two graphs are equal if and only if their digests are."""
+        """Return a hash of the content: two graphs are equal if and only if their digests are."""
         content = encode(self.snapshot())
         return hashlib.blake2b(content, digest_size=16).hexdigest()
 

@@ -59,13 +59,18 @@ class LinkIndex:
             before = len(known)
             known.update(weights)
             if len(known) > before:
-                for target in _newest(known, len(known) - before):
+                # A dict keeps the order in which it was made: these were added last.
+                newest = list(islice(reversed(known), len(known) - before))
+                for target in reversed(newest):
                     self._add_source(links.kind, target, source)
 
     def drop(self, kind: str, source: str, target: str) -> None:
         """Remove a link, if it exists."""
         if kind in EXCLUSIVE_LINKS:
-            self._drop_exclusive(kind, source, target)
+            link = self._target[kind].get(source)
+            if link is not None and link[0] == target:
+                del self._target[kind][source]
+                self._remove_sources(kind, target, {source})
             return
 
         if target in self._targets[kind].get(source, {}):
@@ -82,7 +87,7 @@ class LinkIndex:
                 self._drop_target(kind, source, node)
 
     def targets(self, source: str, kind: str) -> Weights:
-        """The targets of a source's links of a kind, and their weights."""
+        """Return the targets of a source's links of a kind, and their weights."""
         if kind not in EXCLUSIVE_LINKS:
             weights = self._targets[kind].get(source, {})
             return dict(weights)
@@ -94,7 +99,7 @@ class LinkIndex:
         return {target: weight}
 
     def target(self, source: str, kind: str) -> str | None:
-        """The target of a source's link of an exclusive kind; None where it has none."""
+        """Return the target of a source's link of an exclusive kind; None if it has none."""
         link = self._target[kind].get(source)
         if link is None:
             return None
@@ -102,16 +107,18 @@ class LinkIndex:
         return target
 
     def sources(self, target: str, kind: str) -> tuple[str, ...]:
-        """The sources of the links of a kind to a target, in the order in which they were made."""
+        """Return the sources of the links of a kind to a target, in the order in which they were
+        made.
+        """
         sources = self._sources[kind]
         return sources.get(target, ())
 
     def kinds(self) -> list[str]:
-        """The kinds of links that exist or existed, by name."""
+        """Return the kinds of links that exist or existed, by name."""
         return sorted({*self._targets, *self._target})
 
     def in_bulk(self) -> Iterator[Links]:
-        """All links by kind, in an order that depends on the content alone."""
+        """Return all links by kind, in an order that depends on the content alone."""
         for kind in self.kinds():
             if kind in EXCLUSIVE_LINKS:
                 pairs = sorted(self._target[kind].items())
@@ -186,14 +193,6 @@ class LinkIndex:
 
         return self._name_of(target), weight
 
-    def _drop_exclusive(self, kind: str, source: str, target: str) -> None:
-        link = self._target[kind].get(source)
-        if link is None or link[0] != target:
-            return
-
-        del self._target[kind][source]
-        self._remove_sources(kind, target, {source})
-
     def _drop_target(self, kind: str, source: str, target: str) -> None:
         """Remove a link from its source alone."""
         if kind in EXCLUSIVE_LINKS:
@@ -218,10 +217,3 @@ class LinkIndex:
             sources[target] = rest
         else:
             del sources[target]
-
-
-def _newest(weights: Weights, number: int) -> list[str]:
-    """The targets that were added last, in order: a dict keeps the order in which it was made."""
-    newest = list(islice(reversed(weights), number))
-    newest.reverse()
-    return newest

@@ -11,7 +11,7 @@ from cogmap.schemas.nodes import PathColumn, PathSegment
 
 
 def rows_of(path: Iterable[PathSegment]) -> Floats:
-    """(n, len(PathColumn)): the rows of path segments, the oldest first."""
+    """Return the rows, (n, len(PathColumn)), of path segments, the oldest first."""
     ordered = sorted(path, key=lambda segment: segment.number)
 
     rows = [np.zeros((0, len(PathColumn)))]

@@ -47,7 +47,7 @@ class Tile:
         self.activation_cycle: npt.NDArray[np.int32] | None = None
 
     def column(self, name: PlaceColumn) -> Column:
-        """A column to be written."""
+        """Return a column to be written."""
         column = self.columns.get(name)
         if column is not None:
             return column
@@ -57,7 +57,7 @@ class Tile:
         return column
 
     def value(self, name: PlaceColumn, i: int, j: int) -> float:
-        """One cell's value in a column."""
+        """Return one cell's value in a column."""
         column = self.columns.get(name)
         if column is None:
             return DEFAULTS[name]
@@ -70,7 +70,9 @@ class Tile:
         self.activation_cycle[where] = cycle
 
     def activation(self, cycle: int, decay: float) -> Column:
-        """The activation of all cells in `cycle`, having decayed linearly by `decay` a cycle."""
+        """Return the activation of all cells in `cycle`, having decayed linearly by `decay` a
+        cycle.
+        """
         column = self.columns.get(PlaceColumn.ACTIVATION)
         if column is None or self.activation_cycle is None:
             return np.zeros(_SHAPE, np.float32)
@@ -88,7 +90,7 @@ class PlaceGrid:
         self.tiles: dict[TileKey, Tile] = {}
 
     def put_cells(self, cells: Cells) -> None:
-        """Write one column of some cells. Raises MessageError where their arrays do not fit."""
+        """Write one column of some cells. Raises MessageError if their arrays do not fit."""
         where = cells.cells.numpy().astype(np.int64)
         values = cells.values.numpy().astype(np.float32)
         if where.ndim != 2 or where.shape != (values.size, 2):
@@ -107,7 +109,7 @@ class PlaceGrid:
                 tile.set_activation((rows, columns), cells.cycle)
 
     def put_tile(self, message: PlaceTile) -> None:
-        """Write a whole tile. Raises MessageError where a column is of another shape."""
+        """Write a whole tile. Raises MessageError if a column is of another shape."""
         tile = Tile()
         for name, array in message.columns.items():
             values = _square(name, array)
@@ -120,12 +122,14 @@ class PlaceGrid:
         self.tiles[message.map, message.x, message.y] = tile
 
     def messages(self) -> Iterator[PlaceTile]:
-        """All tiles, in order of map and position."""
+        """Return all tiles, in order of map and position."""
         for key in sorted(self.tiles):
             yield self.message(key)
 
     def message(self, key: TileKey) -> PlaceTile:
-        """One tile as it travels. Its arrays share memory with the tile: encode it at once."""
+        """Return one tile as it travels. Its arrays share memory with the tile: encode it
+        at once.
+        """
         map_id, x, y = key
         tile = self.tiles[key]
         columns = {name: Array.of(tile.columns[name]) for name in sorted(tile.columns)}
@@ -142,13 +146,15 @@ class PlaceGrid:
         )
 
     def of_map(self, map_id: str) -> Iterator[tuple[TileKey, Tile]]:
-        """The tiles of one map, in order of position."""
+        """Return the tiles of one map, in order of position."""
         for key in sorted(self.tiles):
             if key[0] == map_id:
                 yield key, self.tiles[key]
 
     def written_cells(self, map_id: str, column: PlaceColumn) -> tuple[Indices, Floats]:
-        """The cells of a map whose value in a column is not 0, (k, 2), and the values, (k,)."""
+        """Return the cells of a map whose value in a column is not 0, (k, 2), and the
+        values, (k,).
+        """
         cells = [np.zeros((0, 2), np.int64)]
         values = [np.zeros(0)]
         for (_, x, y), tile in self.of_map(map_id):
@@ -165,7 +171,7 @@ class PlaceGrid:
         return np.vstack(cells), np.concatenate(values)
 
     def extent(self, map_id: str) -> Extent:
-        """The smallest rectangle with all tiles of a map; an empty one where it has none."""
+        """Return the smallest rectangle with all tiles of a map; an empty one if it has none."""
         tiles = [(x, y) for name, x, y in self.tiles if name == map_id]
         if not tiles:
             return Extent((0, 0), (0, 0))
@@ -178,9 +184,10 @@ class PlaceGrid:
     def window(
         self, map_id: str, columns: Iterable[PlaceColumn], extent: Extent | None = None
     ) -> Window:
-        """Some columns of a map's cells in `extent`, of all its tiles where that is not given.
+        """Return some columns of a map's cells in `extent`, of all its tiles if that is not
+        given.
 
-        Raises MessageError where those are more than MAX_WINDOW_CELLS cells.
+        Raises MessageError if those are more than MAX_WINDOW_CELLS cells.
         """
         names = tuple(columns)
         wanted = self.extent(map_id) if extent is None else extent
@@ -194,7 +201,10 @@ class PlaceGrid:
         for column, name in zip(values, names, strict=True):
             column.fill(DEFAULTS[name])
 
-        for (x, y), tile in self._tiles_in(map_id, wanted):
+        for x, y in positions_in(wanted):
+            tile = self.tiles.get((map_id, x, y))
+            if tile is None:
+                continue
             inside, within = overlap(x, y, wanted)
             for column, name in zip(values, names, strict=True):
                 known = tile.columns.get(name)
@@ -203,15 +213,8 @@ class PlaceGrid:
 
         return Window(wanted.lower, names, values)
 
-    def _tiles_in(self, map_id: str, extent: Extent) -> Iterator[tuple[tuple[int, int], Tile]]:
-        """The tiles of a map that have cells in `extent`, by position."""
-        for position in positions_in(extent):
-            tile = self.tiles.get((map_id, *position))
-            if tile is not None:
-                yield position, tile
-
     def value(self, map_id: str, i: int, j: int, column: PlaceColumn) -> float | None:
-        """One cell's value in a column; None where its tile does not exist."""
+        """Return one cell's value in a column; None if its tile does not exist."""
         x, row = divmod(i, TILE_SIDE)
         y, line = divmod(j, TILE_SIDE)
         tile = self.tiles.get((map_id, x, y))
@@ -222,7 +225,7 @@ class PlaceGrid:
     def place(
         self, map_id: str, i: int, j: int, *, cell_m: float, cycle: int, decay: float
     ) -> Place | None:
-        """One place node as of `cycle`; None where its tile does not exist."""
+        """Return one place node as of `cycle`; None if its tile does not exist."""
         x, row = divmod(i, TILE_SIDE)
         y, line = divmod(j, TILE_SIDE)
         tile = self.tiles.get((map_id, x, y))
@@ -240,7 +243,9 @@ class PlaceGrid:
         )
 
     def links(self, map_id: str, i: int, j: int) -> Iterator[Link]:
-        """The links from a place node to those of its eight neighbours that exist, by direction."""
+        """Return the links from a place node to those of its eight neighbours that exist, by
+        direction.
+        """
         here = place_id(i, j, map_id)
         for (di, dj), column in zip(LINK_OFFSETS.tolist(), WEIGHT_COLUMNS, strict=True):
             forth = self.value(map_id, i, j, column)

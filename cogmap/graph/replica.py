@@ -17,7 +17,7 @@ SNAPSHOT_TIMEOUT_S = 2.0
 
 @dataclass(frozen=True, slots=True)
 class Fetched:
-    """A snapshot with the instance that answered and its incarnation, None where it gave none."""
+    """A snapshot with the instance that answered and its incarnation, None if it gave none."""
 
     snapshot: Snapshot
     source: str = ""
@@ -53,7 +53,7 @@ class Replica:
         self._wanted_version = 0
 
     def join(self) -> None:
-        """Load the graph as it is now. It stays empty where no workspace answers: join again then,
+        """Load the graph as it is now. It stays empty if no workspace answers: join again then,
         unless a delta has come since.
         """
         try:
@@ -69,7 +69,7 @@ class Replica:
     def follow(self, delta: Delta, incarnation: int | None = None) -> bool:
         """Apply `delta`, published by that incarnation of the workspace.
 
-        Returns whether the graph holds it: False where a snapshot is needed and none was to be had,
+        Returns true if the graph holds it: false if a snapshot is needed and none was to be had,
         or where the delta is of an incarnation that has ended.
         """
         if incarnation in self._ended:
@@ -85,7 +85,9 @@ class Replica:
         if self.is_behind and not self.mend():
             return False
         if self._is_other(incarnation):
-            self._end_if_older(incarnation)
+            # One that began before the graph's is ignored from now on.
+            if incarnation is not None and incarnation < (self._incarnation or 0):
+                self._ended.add(incarnation)
             return False
 
         self._incarnation = incarnation
@@ -111,15 +113,8 @@ class Replica:
         self._wanted_version = 0
         return True
 
-    def _end_if_older(self, incarnation: int | None) -> None:
-        """Ignore, from now on, an incarnation that began before the graph's."""
-        if incarnation is None or self._incarnation is None:
-            return
-        if incarnation < self._incarnation:
-            self._ended.add(incarnation)
-
     def _is_other(self, incarnation: int | None) -> bool:
-        """Whether it is known to be another incarnation than the graph's."""
+        """Return true if it is known to be another incarnation than the graph's."""
         if incarnation is None or self._incarnation is None:
             return False
         return incarnation != self._incarnation

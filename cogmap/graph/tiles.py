@@ -16,7 +16,7 @@ _KEY_STEP = 2**32
 
 
 def tiles_of(cells: Indices) -> list[tuple[int, int]]:
-    """The tiles (x, y) that (n, 2) cells lie in, in order."""
+    """Return the tiles (x, y) that (n, 2) cells lie in, in order."""
     if not len(cells):
         return []
 
@@ -52,7 +52,7 @@ def _tile_keys(cells: Indices) -> Indices:
 
 
 def _are_same(keys: Indices) -> bool:
-    """Whether all tiles are one, as most changes are of one tile."""
+    """Return true if all tiles are one, as in most changes."""
     return bool((keys == keys[0]).all())
 
 
@@ -63,7 +63,7 @@ def _tile(key: int) -> tuple[int, int]:
 
 
 def positions_in(extent: Extent) -> Iterator[tuple[int, int]]:
-    """The tiles (x, y) that have cells in `extent`, whether they exist or not."""
+    """Return the tiles (x, y) that have cells in `extent`, whether they exist or not."""
     if not all(extent.shape):
         return
 
@@ -75,7 +75,9 @@ def positions_in(extent: Extent) -> Iterator[tuple[int, int]]:
 
 
 def overlap(x: int, y: int, extent: Extent) -> tuple[Slices, Slices]:
-    """The cells of tile (x, y) that lie in `extent`: within the tile, and within the extent."""
+    """Return the cells of tile (x, y) that lie in `extent`: within the tile, and within
+    the extent.
+    """
     inside = []
     within = []
     for number, lower, upper in zip((x, y), extent.lower, extent.upper, strict=True):

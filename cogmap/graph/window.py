@@ -49,7 +49,7 @@ class Extent:
         return width, height
 
     def grown(self, cells: int) -> Extent:
-        """The rectangle with so many cells more on each side."""
+        """Return the rectangle with so many cells more on each side."""
         (low_i, low_j), (high_i, high_j) = self.lower, self.upper
         return Extent((low_i - cells, low_j - cells), (high_i + cells, high_j + cells))
 
@@ -73,16 +73,18 @@ class Window:
         return width, height
 
     def column(self, name: PlaceColumn) -> Singles:
-        """One column, (width, height). Raises ValueError where the window lacks it."""
+        """Return one column, (width, height). Raises ValueError if the window lacks it."""
         values: Singles = self.values[self.columns.index(name)]
         return values
 
     def weights(self) -> Singles:
-        """The weights of links by direction, (4, width, height), in the order of LINK_OFFSETS."""
+        """Return the weights of links by direction, (4, width, height), in the order of
+        LINK_OFFSETS.
+        """
         return self._stack(WEIGHT_COLUMNS)
 
     def evidence(self) -> Singles:
-        """The evidence of links by direction, (4, width, height), 0 where never seen."""
+        """Return the evidence of links by direction, (4, width, height), 0 if never seen."""
         return self._stack(EVIDENCE_COLUMNS)
 
     def _stack(self, names: tuple[PlaceColumn, ...]) -> Singles:

@@ -16,7 +16,7 @@ IDLE_S = 0.05
 class Client:
     """Runs `module` on a thread of its own while in a `with` statement.
 
-    It is connected to the router at `endpoint`, as one of `agent`'s. Raises NoRouterError where
+    It is connected to the router at `endpoint`, as one of `agent`'s. Raises NoRouterError if
     none answers. Handlers are called on that thread; what ends it early is raised at the end.
 
         graph = Graph()

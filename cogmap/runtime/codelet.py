@@ -53,7 +53,7 @@ class CycleContext:
         with_boundary: bool = False,
         with_scan: bool = False,
     ) -> Task:
-        """A task for `codelet` about nodes `about`, by id.
+        """Return a task for `codelet` about nodes `about`, by id.
 
         `subject` distinguishes the tasks of one codelet in one cycle. It carries what was sensed as
         far as it is asked for: `with_boundary` is where the road ends.
@@ -61,6 +61,11 @@ class CycleContext:
         task_id = f"{self.cycle}/{codelet}"
         if subject:
             task_id = f"{task_id}/{subject}"
+
+        rays = None
+        if with_scan and self.scan is not None:
+            columns = [self.scan.bearing_rad.numpy(), self.scan.range_m.numpy()]
+            rays = Array.of(np.column_stack(columns), "<f4")
 
         return Task(
             stamp_ns=self.stamp_ns,
@@ -74,17 +79,8 @@ class CycleContext:
             motions=self.motions if with_motions else None,
             road_m=self.percepts.road_m if with_road else None,
             road_boundary_m=self.percepts.road_boundary_m if with_boundary else None,
-            scan=_rays(self.scan) if with_scan else None,
+            scan=rays,
         )
-
-
-def _rays(scan: RangeScan | None) -> Array | None:
-    """float32 (n, 2): bearing and range of each ray; None without a scan."""
-    if scan is None:
-        return None
-
-    rays = np.column_stack([scan.bearing_rad.numpy(), scan.range_m.numpy()])
-    return Array.of(rays, "<f4")
 
 
 @dataclass(frozen=True)
@@ -123,7 +119,7 @@ class Codelet:
     section: str = ""
 
     def may_write(self, written: object) -> bool:
-        """Whether it may write nodes or links of that kind, or that place column.
+        """Return true if it may write nodes or links of that kind, or that place column.
 
         Links of kinds that are not in the table of link kinds may be written by every codelet.
         """
@@ -143,9 +139,9 @@ class ConfiguredCodelet:
         return self.codelet.name
 
     def due(self, context: CycleContext, graph: Graph) -> list[Task]:
-        """Its tasks for this cycle."""
+        """Return its tasks for this cycle."""
         return self.codelet.due(context, graph, self.config)
 
     def run(self, task: Task, graph: Graph) -> Answer:
-        """Its answer to a task."""
+        """Return its answer to a task."""
         return self.codelet.run(task, graph, self.config)

@@ -18,11 +18,22 @@ Sections = dict[str, dict[str, Any]]
 
 
 def load(path: Path | None, settings: Iterable[str] = ()) -> Sections:
-    """The sections of the file at `path`, overridden by `settings` such as `action.speed_m_s=3`.
+    """Return the sections of the file at `path`, overridden by `settings` such as
+    `action.speed_m_s=3`.
 
     Raises ConfigError that names the file or the setting that cannot be read.
     """
-    sections = {} if path is None else _read(path)
+    sections: Sections = {}
+    if path is not None:
+        try:
+            sections = tomllib.loads(path.read_text())
+        except FileNotFoundError:
+            raise ConfigError(
+                f"no configuration file {path}: name one that exists, or leave --config out"
+            ) from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+            raise ConfigError(f"cannot read {path} as TOML: {error}") from None
+
     for setting in settings:
         key, equals, value = setting.partition("=")
         section, dot, name = key.partition(".")
@@ -30,27 +41,12 @@ def load(path: Path | None, settings: Iterable[str] = ()) -> Sections:
             raise ConfigError(f"--set {setting}: write it as module.key=value")
 
         keys = _keys_of(section, sections.setdefault(section, {}))
-        keys[name] = _parsed(value)
+        try:
+            keys[name] = tomllib.loads(f"value = {value}")["value"]
+        except tomllib.TOMLDecodeError:
+            # A word needs no quotes.
+            keys[name] = value
     return sections
-
-
-def _read(path: Path) -> Sections:
-    try:
-        return tomllib.loads(path.read_text())
-    except FileNotFoundError:
-        raise ConfigError(
-            f"no configuration file {path}: name one that exists, or leave --config out"
-        ) from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise ConfigError(f"cannot read {path} as TOML: {error}") from None
-
-
-def _parsed(text: str) -> Any:
-    """`text` as a value of TOML; itself where it is none, so that a word needs no quotes."""
-    try:
-        return tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
-        return text
 
 
 def check_sections(sections: Mapping[str, Any], known: Iterable[str]) -> None:
@@ -71,7 +67,7 @@ def _keys_of(name: str, section: Any) -> dict[str, Any]:
 def typed(sections: Sections, name: str, kind: type[C]) -> C:
     """Section `name` as a `kind`, its defaults filled in.
 
-    Raises ConfigError that names the key or the value, also where a number is not finite.
+    Raises ConfigError that names the key or the value, also if a number is not finite.
     """
     section = sections.get(name, {})
     fields = [field.encode_name for field in msgspec.structs.fields(kind)]
@@ -96,7 +92,7 @@ def recorded(sections: Sections, name: str, kind: type[C]) -> C:
 
 
 def _check_finite(path: str, value: Any) -> None:
-    """Raise ConfigError where `value`, or a value in it, is NaN or infinite."""
+    """Raise ConfigError if `value`, or a value in it, is NaN or infinite."""
     if isinstance(value, float) and not math.isfinite(value):
         raise ConfigError(f"{path} is {value}: write a finite number")
     if isinstance(value, list):

@@ -27,11 +27,11 @@ class Follower:
         self._replica = Replica(self._fetch, graph, on_load)
 
     def join(self) -> None:
-        """Load the graph as it is now, empty where no workspace answers."""
+        """Load the graph as it is now, empty if no workspace answers."""
         self._replica.join()
 
     def follow(self, delta: Delta, incarnation: int) -> bool:
-        """Apply `delta`. Returns whether the graph holds it."""
+        """Apply `delta`. Returns true if the graph holds it."""
         return self._replica.follow(delta, incarnation)
 
     def retry(self) -> None:
@@ -42,7 +42,7 @@ class Follower:
             self._replica.join()
 
     def notes(self) -> list[str]:
-        """What there is to report: whether it is behind, and how often it was mended."""
+        """Return what there is to report: whether it is behind, and how often it was mended."""
         replica = self._replica
         notes = []
         if replica.is_behind:

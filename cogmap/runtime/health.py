@@ -41,7 +41,7 @@ class Meter:
     def report(
         self, intake: Intake, inbox: Inbox, publisher: Publisher, ready: bool, notes: list[str]
     ) -> Health:
-        """The counts so far and the busy share since the last report, numbered."""
+        """Return the counts so far and the busy share since the last report, numbered."""
         now_s = time.monotonic()
         since_s = max(1e-9, now_s - self._reported_s)
         busy = self._busy_ns / 1e9 / since_s

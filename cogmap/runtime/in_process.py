@@ -39,19 +39,14 @@ class InProcessRunner:
 
     def run(self, until: Callable[[], bool] = lambda: False) -> None:
         """Run until `until()` is true, or no message is left to process."""
-        while not until():
-            if not self._spin_all():
-                return
+        moved = True
+        while moved and not until():
+            moved = False
+            for shell in self.shells:
+                while shell.spin_once():
+                    moved = True
 
     def close(self) -> None:
         """End every module."""
         for shell in self.shells:
             shell.close()
-
-    def _spin_all(self) -> bool:
-        """Let every module process what it has received. Returns whether there was anything."""
-        moved = False
-        for shell in self.shells:
-            while shell.spin_once():
-                moved = True
-        return moved

@@ -135,7 +135,7 @@ class Module:
         return list(self.answers(message))
 
     def answers(self, message: Message) -> Iterator[Message]:
-        """As `feed`, each message as soon as it is known."""
+        """Do as `feed` does, returning each message as soon as it is known."""
         if self.graph is not None and isinstance(message, Delta):
             self.graph.apply(message)
 

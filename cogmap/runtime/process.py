@@ -42,7 +42,7 @@ class Stop:
 
     @property
     def asked(self) -> bool:
-        """Whether to end."""
+        """True if the process is to end."""
         return self._asked.is_set()
 
     def wait(self, timeout_s: float | None = None) -> bool:
@@ -68,7 +68,7 @@ class Stop:
 
 
 def await_line() -> bool:
-    """Wait for a line on standard input. False where that ended before."""
+    """Wait for a line on standard input. False if that ended before."""
     # Not sys.stdin, which would read ahead.
     while byte := os.read(sys.stdin.fileno(), 1):
         if byte == b"\n":

@@ -37,7 +37,7 @@ class Run(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True)
     ] = False
 
     def has_any(self, *modules: str) -> bool:
-        """Whether one of `modules` takes part."""
+        """Return true if one of `modules` takes part."""
         return not self.participants.keys().isdisjoint(modules)
 
 

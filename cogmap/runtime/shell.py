@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
-from cogmap.bus.codec import Cause, Envelope, decode, encode
+from cogmap.bus.codec import Cause, decode, encode
 from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Bus, Member
 from cogmap.errors import MessageError
 from cogmap.graph.replica import Fetched
@@ -38,8 +38,7 @@ class Shell:
     """Runs `module` on `bus`: `open()` it, then `spin_once()` from one thread; `close()` ends it.
 
     `journal` and `counts` keep on disk what a restart must not lose, and `store` what the next run
-    is to know. `health` is whether it
-    publishes its health once a second.
+    is to know. With `health` it publishes its health once a second.
     """
 
     def __init__(
@@ -67,17 +66,32 @@ class Shell:
         self._follower: Follower | None = None
         if module.graph is not None:
             self._follower = Follower(module.graph, bus, self._on_load)
-        self._timers = Timers(self._jobs())
+
+        jobs = [(timer.period_ns, self._timer(timer.handler)) for timer in module.timers]
+        if health:
+            jobs.append((HEALTH_PERIOD_NS, self._publish_health))
+        if self._follower is not None:
+            follower = self._follower
+            jobs.append((RETRY_PERIOD_NS, lambda now_ns: follower.retry()))
+        self._timers = Timers(jobs)
 
     def open(self) -> None:
         """Restore the journal, join the bus, and announce the module.
 
-        What others publish once they see it announced arrives here. Raises UsageError where the
+        What others publish once they see it announced arrives here. Raises UsageError if the
         journal cannot be read.
         """
-        backfill = self._restore()
+        backfill: frozenset[topics.Topic] = frozenset()
+        if self._journal is not None and self.module.restore is not None:
+            self.module.restore(self._journal.messages())
+            if not self._journal.is_empty:
+                backfill = self.module.backfill
+
         self.publisher.declare(self._health)
-        self._subscribe(backfill)
+        for topic in self.module.handlers:
+            if topic is not topics.PRESENCE:
+                history = CACHED_MESSAGES if topic in backfill else 0
+                self.bus.subscribe(topic, self.inbox.put, self.intake.count_lost, history)
         for request, (reply, handler) in self.module.served.items():
             answer = self._server(request, handler)
             self.bus.serve(request, reply, answer, self.inbox.call)
@@ -88,13 +102,16 @@ class Shell:
             self._follower.join()
         self.bus.announce(Member(self.module.name, self.module.instance))
         if self.module.requires or self._observes_presence:
-            self.bus.watch(self._watch)
+            # Handled on the module's own thread.
+            self.bus.watch(
+                lambda member, alive: self.inbox.call(lambda: self._on_presence(member, alive))
+            )
 
     def spin_once(self, timeout_s: float | None = 0.0) -> bool:
         """Run the timers that are due, and handle the oldest arrival, if one comes in `timeout_s`.
 
         `timeout_s` None waits until there is one or a timer is due. Returns whether there was an
-        arrival or a job. Raises StorageError where the journal cannot be written.
+        arrival or a job. Raises StorageError if the journal cannot be written.
         """
         due_s = self._timers.run_due()
         waits = [wait_s for wait_s in (timeout_s, due_s) if wait_s is not None]
@@ -138,34 +155,6 @@ class Shell:
             notes.append(f"{self.meter.faults} faults: run with --verbose to see them")
         return notes
 
-    def _jobs(self) -> list[tuple[int, Due]]:
-        jobs = [(timer.period_ns, self._timer(timer.handler)) for timer in self.module.timers]
-        if self._health:
-            jobs.append((HEALTH_PERIOD_NS, self._publish_health))
-        if self._follower is not None:
-            jobs.append((RETRY_PERIOD_NS, self._retry))
-        return jobs
-
-    def _restore(self) -> frozenset[topics.Topic]:
-        """Hand the journal to the module. Returns the topics of which it wants the past."""
-        journal = self._journal
-        restore = self.module.restore
-        if journal is None or restore is None:
-            return frozenset()
-
-        restore(journal.messages())
-        if journal.is_empty:
-            return frozenset()
-        return self.module.backfill
-
-    def _subscribe(self, backfill: frozenset[topics.Topic]) -> None:
-        """Subscribe to what the module handles, with the past of those topics."""
-        for topic in self.module.handlers:
-            if topic is topics.PRESENCE:
-                continue
-            history = CACHED_MESSAGES if topic in backfill else 0
-            self.bus.subscribe(topic, self.inbox.put, self.intake.count_lost, history)
-
     @property
     def _observes_presence(self) -> bool:
         return topics.PRESENCE in self.module.handlers
@@ -176,18 +165,17 @@ class Shell:
         envelope = arrival.envelope
         if message is None or envelope is None:
             return
-        if not self._follow(message, envelope):
+        follower = self._follower
+        if (
+            follower is not None
+            and isinstance(message, Delta)
+            and not follower.follow(message, envelope.incarnation)
+        ):
             return
 
         self.publisher.trace(message.stamp_ns, envelope)
         cause = (arrival.topic.name, envelope.source, envelope.seq)
         self._invoke(lambda: self.module.answers(message), cause, True, received_ns)
-
-    def _follow(self, message: Message, envelope: Envelope) -> bool:
-        """Apply a delta to the module's graph. Returns whether the module may receive `message`."""
-        if self._follower is None or not isinstance(message, Delta):
-            return True
-        return self._follower.follow(message, envelope.incarnation)
 
     def _invoke(
         self,
@@ -229,16 +217,12 @@ class Shell:
             self.intake.reject(topic, str(error))
             return
         except Exception as error:
-            self._count_fault(topic, error)
+            self.meter.faults += 1
+            self.intake.reject(topic, f"{topic}: {type(error).__name__}: {error}")
+            log.debug("fault in %s", self.module.instance, exc_info=True)
             return
 
         yield None
-
-    def _count_fault(self, topic: str, error: Exception) -> None:
-        kind = type(error).__name__
-        self.meter.faults += 1
-        self.intake.reject(topic, f"{topic}: {kind}: {error}")
-        log.debug("fault in %s", self.module.instance, exc_info=True)
 
     def _timer(self, handler: Callable[[int], Reply]) -> Due:
         def due(now_ns: int) -> None:
@@ -263,19 +247,11 @@ class Shell:
 
         return answer
 
-    def _retry(self, now_ns: int) -> None:
-        if self._follower is not None:
-            self._follower.retry()
-
     def _on_load(self, fetched: Fetched) -> None:
         """Name the snapshot that replaced the graph as a cause of what is published next."""
         version = fetched.snapshot.version
         cause = (topics.SNAPSHOT.name, fetched.source, version)
         self._invoke(self.module.loaded, cause)
-
-    def _watch(self, member: Member, alive: bool) -> None:
-        """Hand a change of who is there to the module's own thread."""
-        self.inbox.call(lambda: self._on_presence(member, alive))
 
     def _on_presence(self, member: Member, alive: bool) -> None:
         self._roster.update(member, alive)
@@ -283,7 +259,7 @@ class Shell:
             self._feed_presence(member, alive)
         if not self._started and not self.missing:
             self._started = True
-            self._start()
+            self._invoke(self._start, (START, self.module.instance, 0))
 
     def _feed_presence(self, member: Member, alive: bool) -> None:
         """Publish what this module observed, for the log, and hand it to the module."""
@@ -298,16 +274,9 @@ class Shell:
         cause = (topics.PRESENCE.name, presence.source, presence.seq)
         self._invoke(lambda: self.module.feed(presence), cause)
 
-    def _start(self) -> None:
+    def _start(self) -> list[Message]:
         start = self.module.start
-        if start is None:
-            return
-
-        def call() -> list[Message]:
-            return self.module.stamp(start())
-
-        cause = (START, self.module.instance, 0)
-        self._invoke(call, cause)
+        return [] if start is None else self.module.stamp(start())
 
     def _publish_health(self, now_ns: int) -> None:
         health = self.meter.report(

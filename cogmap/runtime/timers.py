@@ -33,7 +33,7 @@ class Timers:
         self._jobs = [_Job(now_ns + period_ns, period_ns, due) for period_ns, due in jobs]
 
     def run_due(self) -> float | None:
-        """Run what is due. Returns seconds until the next is, None where there is none."""
+        """Run what is due. Returns seconds until the next is, None if there is none."""
         if not self._jobs:
             return None
 

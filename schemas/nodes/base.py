@@ -22,7 +22,7 @@ class GraphNode(Part, kw_only=True, frozen=True):
     values now follow from the graph's decay.
 
     `salience` is the feeling attached to the node, LIDA's incentive salience: how much it matters
-    now, below 0 where it is bad or is missed.
+    now, below 0 if it is bad or is missed.
     """
 
     id: Name

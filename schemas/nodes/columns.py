@@ -128,7 +128,7 @@ class RouteColumn(enum.IntEnum):
 
 
 def check_matrix(node: str, matrix: Matrix, dtype: str, columns: tuple[int, ...]) -> None:
-    """Raise ValueError where a matrix is of another dtype or width, or has no rows or too many."""
+    """Raise ValueError if a matrix is of another dtype or width, or has no rows or too many."""
     rows, width = matrix.shape
     if matrix.dtype != dtype or width not in columns:
         wanted = " or ".join(map(str, columns))

@@ -21,84 +21,86 @@ class Side(enum.StrEnum):
 
 
 def object_id(label: str) -> str:
-    """The id of the object that perception calls `label`."""
+    """Return the id of the object that perception calls `label`."""
     return f"object:{label}"
 
 
 def category_id(function: str) -> str:
-    """The id of the category of all objects with a function, such as shop."""
+    """Return the id of the category of all objects with a function, such as shop."""
     return f"category:{function}"
 
 
 def individual_label(look: str, number: int) -> str:
-    """The label of one of the objects that perception calls `look`, numbered from 1."""
+    """Return the label of one of the objects that perception calls `look`, numbered from 1."""
     return look if number == 1 else f"{look}~{number}"
 
 
 def look_of(label: str) -> str:
-    """What perception calls an object, by the label that `individual_label` gave it."""
+    """Return what perception calls an object, by the label that `individual_label` gave it."""
     return label.partition("~")[0]
 
 
 def goal_id(name: str) -> str:
-    """The id of the goal that a person calls `name`."""
+    """Return the id of the goal that a person calls `name`."""
     return f"goal:{name}"
 
 
 def feeling_id(name: str) -> str:
-    """The id of the feeling `name`, such as danger."""
+    """Return the id of the feeling `name`, such as danger."""
     return f"feeling:{name}"
 
 
 def relation_id(side: Side, look: str) -> str:
-    """The id of the relation of standing next to what perception calls `look`, on that side."""
+    """Return the id of the relation of standing next to what perception calls `look`, on
+    that side.
+    """
     return f"{RELATION}{side}:{look}"
 
 
 def is_relation(identifier: str) -> bool:
-    """Whether an id is that of a relation."""
+    """Return true if an id is that of a relation."""
     return identifier.startswith(RELATION)
 
 
 def percept_id(label: str) -> str:
-    """The id of the percept of the object that perception calls `label`."""
+    """Return the id of the percept of the object that perception calls `label`."""
     return f"percept:{label}"
 
 
 def need_id(name: str) -> str:
-    """The id of the need of `name`, such as energy."""
+    """Return the id of the need of `name`, such as energy."""
     return f"need:{name}"
 
 
 def episode_id(number: int) -> str:
-    """The id of the episode that long-term memory has under `number`."""
+    """Return the id of the episode that long-term memory has under `number`."""
     return f"episode:{number}"
 
 
 def attention_id(codelet: str) -> str:
-    """The id of what attention codelet `codelet` keeps."""
+    """Return the id of what attention codelet `codelet` keeps."""
     return f"attention:{codelet}"
 
 
 def map_id(number: int) -> str:
-    """The id of a sub-map. Sub-maps are numbered from 1; the root map is number 0."""
+    """Return the id of a sub-map. Sub-maps are numbered from 1; the root map is number 0."""
     return f"map:{number}"
 
 
 def coarse_map_id(level: int) -> str:
-    """The id of a map with the root map's places on a coarser grid, coarser with each level from 1
-    on.
+    """Return the id of a map with the root map's places on a coarser grid, coarser with each level
+    from 1 on.
     """
     return f"{COARSE_MAP}{level}"
 
 
 def is_coarse_map(identifier: str) -> bool:
-    """Whether a map's id is that of a coarse map."""
+    """Return true if a map's id is that of a coarse map."""
     return identifier.startswith(COARSE_MAP)
 
 
 def map_number(identifier: str) -> int | None:
-    """The number of a map's id; None for a coarse map's, and any other id."""
+    """Return the number of a map's id; None for a coarse map's, and any other id."""
     number = identifier.removeprefix("map:")
     if number == identifier or not number.isdecimal():
         return None
@@ -107,22 +109,22 @@ def map_number(identifier: str) -> int | None:
 
 
 def segment_id(number: int) -> str:
-    """The id of a path segment."""
+    """Return the id of a path segment."""
     return f"path:{number}"
 
 
 def observations_id(number: int, label: str) -> str:
-    """The id of the observations of landmark `label` along path segment `number`."""
+    """Return the id of the observations of landmark `label` along path segment `number`."""
     return f"observations:{number}:{label}"
 
 
 def place_id(i: int, j: int, map_id: str = ROOT_MAP) -> str:
-    """The id of the place node of grid cell (i, j)."""
+    """Return the id of the place node of grid cell (i, j)."""
     return f"place:{map_id}:{i}:{j}"
 
 
 def place_cell(identifier: str) -> tuple[str, int, int] | None:
-    """The map and the grid cell of a place node's id; None for any other node's."""
+    """Return the map and the grid cell of a place node's id; None for any other node's."""
     if not identifier.startswith("place:"):
         return None
 
@@ -134,7 +136,7 @@ def place_cell(identifier: str) -> tuple[str, int, int] | None:
 
 
 def nearest_place(x_m: float, y_m: float, cell_m: float, map_id: str = ROOT_MAP) -> str:
-    """The id of the place node nearest to a position, in a grid of `cell_m`."""
+    """Return the id of the place node nearest to a position, in a grid of `cell_m`."""
     i = round(x_m / cell_m)
     j = round(y_m / cell_m)
     return place_id(i, j, map_id)

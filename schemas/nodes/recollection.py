@@ -39,7 +39,7 @@ class Recollection(GraphNode, kw_only=True, frozen=True, tag="recollection"):
     `x_m`, `y_m` and `heading_rad` are the pose of the root map's frame in that of the recalled map
     `map`, whose places are as far apart. `labels` and `functions` are those of the objects whose
     positions and sizes are in `objects`, see RecalledColumn; `matched` are the labels that they
-    have on the root map, empty where they have none. `tiles` are the squares of place nodes that
+    have on the root map, empty if they have none. `tiles` are the squares of place nodes that
     are known, and `columns` their values, (k, TILE_CELLS) float16 each, row-major as in a tile.
     `sub_maps` is the tree below it, of objects by their labels in `labels`.
     """
@@ -70,7 +70,7 @@ class Recollection(GraphNode, kw_only=True, frozen=True, tag="recollection"):
 
 
 def check_tree(name: str, sub_maps: Sequence[SubMap]) -> None:
-    """Raise ValueError where sub-maps are no tree: where one has no parent before it, or is there
+    """Raise ValueError if sub-maps are no tree: where one has no parent before it, or is there
     twice, or an object is in two.
     """
     known = {0}

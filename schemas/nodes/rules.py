@@ -68,7 +68,7 @@ KINDS: dict[type[GraphNode], KindRules] = {
 
 
 def kind_of(node: GraphNode) -> str:
-    """The name of a node's kind, as it travels."""
+    """Return the name of a node's kind, as it travels."""
     if isinstance(node, Node):
         return node.kind
 
@@ -76,5 +76,5 @@ def kind_of(node: GraphNode) -> str:
 
 
 def kind_name(kind: type[GraphNode]) -> str:
-    """The name of a kind, as it travels."""
+    """Return the name of a kind, as it travels."""
     return str(kind.__struct_config__.tag)

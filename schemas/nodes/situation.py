@@ -28,11 +28,11 @@ class PathIntegration(msgspec.Struct, kw_only=True, frozen=True):
     variance_rad2: Spread = 0.0
 
     def pose(self) -> npt.NDArray[np.float64]:
-        """(3,): x, y and heading."""
+        """Return x, y and heading, (3,)."""
         return np.array([self.x_m, self.y_m, self.heading_rad])
 
     def variances(self) -> npt.NDArray[np.float64]:
-        """(2,): in m^2 and rad^2."""
+        """Return the variances in m^2 and rad^2, (2,)."""
         return np.array([self.variance_m2, self.variance_rad2])
 
 
@@ -103,7 +103,7 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     to a thousandth of their spread. `sightings` is the number of views that agree with the
     position, `misses` that of views in a row that do not. One that is `surveyed` was given, and
     stays where it is. `last_seen_ns` and `created_ns` are times of views. `function` is what it is
-    used for, such as "shop", empty where that is unknown.
+    used for, such as "shop", empty if that is unknown.
     """
 
     label: Name
@@ -127,7 +127,7 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
             check_matrix(self.id, self.offsets_m, "<f2", (2,))
 
     def positions_m(self) -> npt.NDArray[np.float64]:
-        """(n, 2) samples of its position; one, the mean, where it has none."""
+        """Return (n, 2) samples of its position; one, the mean, if it has none."""
         mean = np.array([[self.x_m, self.y_m]])
         if self.offsets_m is None:
             return mean
@@ -141,7 +141,7 @@ class Map(GraphNode, kw_only=True, frozen=True, tag="map"):
     The frame's origin and direction are in the frame of `parent`; the root map has none. A sub-map
     holds what is at most `width_m` / 2 east or west and `height_m` / 2 north or south of its
     origin; both are 0 of a map without limits. `remembered` is what long-term memory calls the map
-    that was recalled and joined to it, empty where none was.
+    that was recalled and joined to it, empty if none was.
     """
 
     cell_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]

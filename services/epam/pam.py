@@ -231,7 +231,15 @@ def _percepts(found: list[Candidate], camera: Calibration) -> list[Percept]:
     """Each is placed by its known footprint if that fits what is seen, else as a building of the
     usual size.
     """
-    silhouettes = [_silhouette(candidate) for candidate in found]
+    # Those whose size is known, and of which at least one true end is seen.
+    silhouettes: list[Silhouette | None] = []
+    for candidate in found:
+        size_m = candidate.recognition.size_m
+        seen = candidate.walls
+        if size_m is not None and (seen.left_true or seen.right_true):
+            silhouettes.append(seen.silhouette(size_m[:2]))
+        else:
+            silhouettes.append(None)
     located = iter(locate([each for each in silhouettes if each is not None], camera))
 
     percepts = []
@@ -270,14 +278,3 @@ def _percepts(found: list[Candidate], camera: Calibration) -> list[Percept]:
         )
 
     return percepts
-
-
-def _silhouette(candidate: Candidate) -> Silhouette | None:
-    """None unless the size is known and at least one true end is seen."""
-    size_m = candidate.recognition.size_m
-    seen = candidate.walls
-    if size_m is None or not (seen.left_true or seen.right_true):
-        return None
-
-    longer_m, shorter_m, _ = size_m
-    return seen.silhouette((longer_m, shorter_m))

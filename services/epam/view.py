@@ -16,7 +16,7 @@ MIN_FOCAL_LENGTH_PX = 1.0
 @dataclass(frozen=True, eq=False)
 class ViewArrays:
     """RGB `image`, uint8 (h, w, 3), with its depth in metres and its disparity in pixels, float32
-    (h, w), 0 where unknown.
+    (h, w), 0 if unknown.
     """
 
     image: Bytes

@@ -23,25 +23,6 @@ def scan(depth_m: Singles, calibration: Calibration, sectors: int) -> tuple[Sing
     Of each image column its third-nearest pixel counts that shows an obstacle. Bearing and range
     are from the robot's origin.
     """
-    bearing_rad, range_m = _obstacles(depth_m, calibration)
-
-    right_px = calibration.width_px - calibration.cx_px
-    half_rad = math.atan(max(calibration.cx_px, right_px) / calibration.fx_px)
-    sector_rad = 2 * half_rad / sectors
-    from_left = np.floor((half_rad - bearing_rad) / sector_rad)
-    sector = from_left.astype(np.int64).clip(0, sectors - 1)
-
-    nearest_m = np.full(sectors, np.inf)
-    np.minimum.at(nearest_m, sector, range_m)
-    nearest_m[np.isinf(nearest_m)] = 0.0
-
-    middles = np.arange(sectors) + 0.5
-    middle_rad = half_rad - middles * sector_rad
-    return middle_rad.astype(np.float32), nearest_m.astype(np.float32)
-
-
-def _obstacles(depth_m: Singles, calibration: Calibration) -> tuple[Floats, Floats]:
-    """Bearing and range of the nearest obstacle in each image column that has one, (k,) each."""
     rows = np.arange(calibration.height_px)
     slope = (rows - calibration.cy_px) / calibration.fy_px
     below_camera_m = slope.astype(np.float32)[:, None] * depth_m
@@ -53,12 +34,22 @@ def _obstacles(depth_m: Singles, calibration: Calibration) -> tuple[Floats, Floa
     candidates_m = np.where(is_obstacle, depth_m, np.inf).astype(np.float64)
     number = MIN_OBSTACLE_PIXELS - 1
     by_column_m: Floats = np.partition(candidates_m, number, axis=0)[number]
-    is_seen = np.isfinite(by_column_m)
+    columns = np.flatnonzero(np.isfinite(by_column_m))
+    ahead_m = by_column_m[columns]
+    forward_m = ahead_m + calibration.mount_forward_m
+    left_m = (calibration.cx_px - columns) / calibration.fx_px * ahead_m
+    bearing_rad = np.arctan2(left_m, forward_m)
 
-    nearest_m = by_column_m[is_seen]
-    columns = np.arange(calibration.width_px)[is_seen]
+    right_px = calibration.width_px - calibration.cx_px
+    half_rad = math.atan(max(calibration.cx_px, right_px) / calibration.fx_px)
+    sector_rad = 2 * half_rad / sectors
+    from_left = np.floor((half_rad - bearing_rad) / sector_rad)
+    sector = from_left.astype(np.int64).clip(0, sectors - 1)
 
-    forward_m = nearest_m + calibration.mount_forward_m
-    left_m = (calibration.cx_px - columns) / calibration.fx_px * nearest_m
+    nearest_m = np.full(sectors, np.inf)
+    np.minimum.at(nearest_m, sector, np.hypot(forward_m, left_m))
+    nearest_m[np.isinf(nearest_m)] = 0.0
 
-    return np.arctan2(left_m, forward_m), np.hypot(forward_m, left_m)
+    middles = np.arange(sectors) + 0.5
+    middle_rad = half_rad - middles * sector_rad
+    return middle_rad.astype(np.float32), nearest_m.astype(np.float32)

@@ -89,7 +89,7 @@ class VisualOdometry:
         """Return the motion since the last view, by the wheels and the views; by the wheels alone
         if the views do not suffice.
 
-        `image` is RGB (h, w, 3); `depth_m` (h, w) is its depth along the optical axis, 0 where it
+        `image` is RGB (h, w, 3); `depth_m` (h, w) is its depth along the optical axis, 0 if it
         is unknown.
         """
         grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)

@@ -22,7 +22,7 @@ from cogmap.errors import MessageError
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 from cogmap.schemas.array import Array
-from cogmap.schemas.export import GOLDEN
+from cogmap.schemas.examples import GOLDEN
 from cogmap.schemas.sensing import MotorCommand, RangeScan
 from examples import in_process, wanderer, wanderer_msgpack
 from tests.support.includes import LANGUAGES, PAGES, ROOT, included, included_paths

@@ -16,12 +16,14 @@ from msgspec.inspect import FloatType
 from cogmap.bus.codec import Envelope, decode, encode
 from cogmap.schemas import sensing, topics
 from cogmap.schemas.base import Message
-from cogmap.schemas.examples import example_messages
-from cogmap.schemas.export import GOLDEN, export_golden, export_schemas, file_name, json_schema
+from cogmap.schemas.examples import GOLDEN, example, example_messages
+from cogmap.schemas.export import export_golden, export_schemas, json_schema
 from cogmap.schemas.topics import Delivery, Scope, Topic
 from tests.support.damage import golden
 
 BY_TOPIC = {topics.of(message): message for message in example_messages()}
+# All but those of records whose fields must fit each other.
+DERIVABLE = [topic for topic in topics.ALL if topic not in (topics.STORED, topics.RESTORED)]
 each_topic = pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
 
 
@@ -86,7 +88,7 @@ def test_the_json_schema_names_every_field_and_what_it_means(topic: Topic) -> No
 
 def test_every_golden_file_belongs_to_a_topic() -> None:
     assert {path.name for path in GOLDEN.iterdir()} == {
-        file_name(topic, ".msgpack") for topic in topics.ALL
+        f"{topic.file_stem}.msgpack" for topic in topics.ALL
     }
 
 
@@ -156,14 +158,45 @@ def test_the_floats_of_a_type_are_found_at_any_depth() -> None:
     assert len(list(_floats(view))) > 3
 
 
-@each_topic
-def test_every_field_of_a_sample_differs_from_its_default(topic: Topic) -> None:
-    sample = BY_TOPIC[topic]
-    defaults = sample.__struct_defaults__
-    optional = sample.__struct_fields__[-len(defaults) :]
-    same = []
-    for name, default in zip(optional, defaults, strict=True):
-        if getattr(sample, name) == default:
-            same.append(name)
+def _defaults_in(message: Message) -> list[str]:
+    """The fields of a message that have their default."""
+    defaults = message.__struct_defaults__
+    optional = message.__struct_fields__[-len(defaults) :]
+    return [
+        name
+        for name, default in zip(optional, defaults, strict=True)
+        if getattr(message, name) == default
+    ]
 
-    assert same in ([], ["seq"])
+
+@each_topic
+def test_every_field_of_an_example_differs_from_its_default(topic: Topic) -> None:
+    assert _defaults_in(BY_TOPIC[topic]) in ([], ["seq"])
+
+
+@pytest.mark.parametrize("topic", DERIVABLE, ids=lambda topic: topic.name)
+def test_a_new_message_needs_no_example_of_its_own(topic: Topic, tmp_path: Path) -> None:
+    message = example(topic, tmp_path)
+
+    assert decode(topic, encode(message)) == message
+    assert _defaults_in(message) == ["seq"]
+
+
+def test_where_fields_must_fit_each_other_an_example_is_asked_for(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"no example of Stored .* add one .* to BY_HAND"):
+        example(topics.STORED, tmp_path)
+
+
+def test_a_new_field_and_a_new_kind_of_node_get_an_example(tmp_path: Path) -> None:
+    plain = msgspec.msgpack.decode(golden(topics.DELTA))
+    kinds = {operation["type"] for operation in plain["operations"]}
+    del plain["reasons"]
+    plain["operations"] = [each for each in plain["operations"] if each["type"] != "goal"]
+    older = tmp_path / f"{topics.DELTA.file_stem}.msgpack"
+    older.write_bytes(msgspec.msgpack.encode(plain))
+
+    delta = example(topics.DELTA, tmp_path)
+
+    completed = msgspec.to_builtins(delta)
+    assert completed["reasons"]
+    assert {operation["type"] for operation in completed["operations"]} == kinds

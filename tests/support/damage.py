@@ -10,13 +10,12 @@ import msgspec
 import numpy as np
 
 from cogmap.schemas import topics
-from cogmap.schemas.export import GOLDEN, file_name
+from cogmap.schemas.examples import GOLDEN
 from cogmap.schemas.topics import Topic
 
 
 def golden(topic: Topic) -> bytes:
-    path = GOLDEN / file_name(topic, ".msgpack")
-    return path.read_bytes()
+    return (GOLDEN / f"{topic.file_stem}.msgpack").read_bytes()
 
 
 def poisoned(value: Any, poison: float) -> Any:

@@ -93,7 +93,7 @@ def render(job: Job) -> None:
 
 def with_stereo_depth(views: Views) -> Views:
     """Return `views` with the rectified `left` image and its calibration, and, instead of the
-    `right` image, the depth `stereo_m` float32 (n, h, w), 0 where it is unknown.
+    `right` image, the depth `stereo_m` float32 (n, h, w), 0 if it is unknown.
     """
     cv2.setNumThreads(1)
     encoded = views["calibration"].tobytes()

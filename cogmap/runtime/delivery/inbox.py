@@ -48,7 +48,9 @@ class Inbox:
         self._waiting.put(job)
 
     def take(self, timeout_s: float | None) -> Arrival | Job | None:
-        """The oldest arrival or job; None if none comes in `timeout_s` (None waits for ever)."""
+        """Return the oldest arrival or job; None if none comes in `timeout_s` (None waits for
+        ever).
+        """
         try:
             item = self._waiting.get(timeout_s != 0, timeout_s)
         except Empty:

@@ -28,7 +28,7 @@ class _Stream:
     def advance(self, envelope: Envelope) -> int:
         """Make `envelope` the last one. Returns how many messages are missing before it.
 
-        Raises MessageError where it is not newer.
+        Raises MessageError if it is not newer.
         """
         last = self.last
         if envelope.incarnation in self.ended:
@@ -40,19 +40,13 @@ class _Stream:
             missing = envelope.seq - last.seq - 1
         else:
             self.ended.add(last.incarnation)
-            missing = _missing_between(last, envelope)
+            missing = 0
+            if UNKNOWN not in (last.earlier, envelope.earlier):
+                received = last.earlier + last.seq + 1
+                missing = max(0, envelope.earlier + envelope.seq - received)
 
         self.last = envelope
         return missing
-
-
-def _missing_between(last: Envelope, first: Envelope) -> int:
-    """How many messages of a source were lost between two incarnations, 0 where it is not known."""
-    if UNKNOWN in (last.earlier, first.earlier):
-        return 0
-    received = last.earlier + last.seq + 1
-    published = first.earlier + first.seq
-    return max(0, published - received)
 
 
 class Intake:
@@ -69,11 +63,15 @@ class Intake:
         self._suppressed: Counter[str] = Counter()
 
     def accept(self, arrival: Arrival) -> Message | None:
-        """The message in `arrival`, or None where it is not one or was received before."""
+        """Return the message in `arrival`, or None if it is not one or was received before."""
         topic = arrival.topic
+        envelope = arrival.envelope
         try:
             message = decode(topic, arrival.payload)
-            envelope = _matching(arrival, message)
+            if envelope is None:
+                raise MessageError(f"{topic.name}: no envelope")
+            if (envelope.source, envelope.seq) != (message.source, message.seq):
+                raise MessageError(f"{topic.name}: envelope and message name different sources")
             if topic.delivery is Delivery.NEVER_DROP:
                 self._follow(topic, envelope)
         except MessageError as error:
@@ -94,7 +92,7 @@ class Intake:
         self._log(topic, f"rejected {reason}")
 
     def _follow(self, topic: Topic, envelope: Envelope) -> None:
-        """Notice what is missing before a message. Raises MessageError where it is not newer."""
+        """Notice what is missing before a message. Raises MessageError if it is not newer."""
         stream = self._streams.get((topic, envelope.source))
         if stream is None:
             self._streams[topic, envelope.source] = _Stream(envelope)
@@ -129,16 +127,3 @@ class Intake:
         more = f" (and {suppressed} more since)" if suppressed else ""
         log.warning("%s%s", sentence[:_MAX_SENTENCE], more)
         self._log_after_s[topic] = now_s + LOG_INTERVAL_S
-
-
-def _matching(arrival: Arrival, message: Message) -> Envelope:
-    """The envelope of `arrival`. Raises MessageError where it is missing or another message's."""
-    name = arrival.topic.name
-    envelope = arrival.envelope
-    if envelope is None:
-        raise MessageError(f"{name}: no envelope")
-
-    is_same = envelope.source == message.source and envelope.seq == message.seq
-    if not is_same:
-        raise MessageError(f"{name}: envelope and message name different sources")
-    return envelope

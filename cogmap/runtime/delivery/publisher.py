@@ -86,7 +86,7 @@ class Publisher:
             self._causes.append(cause)
 
     def send(self, message: Message, computation: Computation) -> None:
-        """Publish a numbered message. Raises StorageError where the state cannot be written."""
+        """Publish a numbered message. Raises StorageError if the state cannot be written."""
         topic = topics.of(message)
         payload = encode(message)
         if self._journal is not None and topic is self._module.journal:
@@ -96,8 +96,9 @@ class Publisher:
 
         envelope = self._envelope(topic, message, computation.end_ns)
         envelope.causes = self._take_causes()
-        if computation.answers and not topic.sensed:
-            self._continue_trace(envelope, message, computation)
+        trace = self._traces.get(message.stamp_ns)
+        if trace is not None and computation.answers and not topic.sensed:
+            envelope.continue_trace(trace, self._module.name, computation.compute_ns)
 
         self._bus.publish(topic, payload, envelope)
         self.emitted[topic.name] += 1
@@ -135,16 +136,9 @@ class Publisher:
         self._bus.publish(topic, payload, envelope)
 
     def answer_envelope(self) -> Envelope:
-        """The envelope of an answer to a query, which has no number."""
+        """Return the envelope of an answer to a query, which has no number."""
         now_ns = time.time_ns()
         return Envelope(self._module.instance, 0, self.incarnation, now_ns, now_ns)
-
-    def _continue_trace(
-        self, envelope: Envelope, message: Message, computation: Computation
-    ) -> None:
-        trace = self._traces.get(message.stamp_ns)
-        if trace is not None:
-            envelope.continue_trace(trace, self._module.name, computation.compute_ns)
 
     def _envelope(self, topic: Topic, message: Message, born_ns: int) -> Envelope:
         earlier = UNKNOWN

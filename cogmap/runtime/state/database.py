@@ -8,17 +8,13 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterable, Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 
 from cogmap.runtime.state.changes import Changes
 from cogmap.runtime.state.failures import named
 from cogmap.runtime.state.opening import Progress, new_database, opened, rows, totals
 from cogmap.runtime.state.record import Record
-
-
-def _unseen(share: float) -> None:
-    """Progress that nobody follows."""
 
 
 class Database:
@@ -31,7 +27,7 @@ class Database:
     where the file is damaged, or the disk refuses.
     """
 
-    def __init__(self, path: Path, progress: Progress = _unseen) -> None:
+    def __init__(self, path: Path, progress: Progress = lambda share: None) -> None:
         if not path.exists():
             write_new(path, ())
         self._path = path
@@ -59,7 +55,7 @@ class Database:
                 changes.remove(key)
 
     def records(self) -> Iterator[Record]:
-        """Every record, by the time it was put. Nothing may be put or removed meanwhile."""
+        """Return every record, by the time it was put. Nothing may be put or removed meanwhile."""
         with named(self._path):
             for record, _ in rows(self._connection, self._path):
                 yield record
@@ -72,7 +68,7 @@ class Database:
 
     @property
     def is_empty(self) -> bool:
-        """Whether it has no record."""
+        """True if it has no record."""
         return self.count == 0
 
     def close(self) -> None:
@@ -91,27 +87,18 @@ class Database:
                 changes.finish()
                 connection.execute("COMMIT")
             except BaseException:
-                _roll_back(connection)
+                # SQLite itself rolls back if the disk is full. If the disk refuses that too, SQLite
+                # refuses all that follows, and opening the file anew rolls back.
+                if connection.in_transaction:
+                    with suppress(sqlite3.OperationalError):
+                        connection.execute("ROLLBACK")
                 raise
 
 
 def write_new(path: Path, records: Iterable[Record]) -> None:
     """Make a database of `records` at `path`, which is there once it has all of them.
 
-    Nothing is there where `records` raises. Raises StorageError where there is a file already.
+    Nothing is there where `records` raises. Raises StorageError if there is a file already.
     """
     with new_database(path) as made, closing(Database(made)) as database:
         database.put(records)
-
-
-def _roll_back(connection: sqlite3.Connection) -> None:
-    """Undo what is open; SQLite itself has where the disk was full.
-
-    Where the disk refuses that too, SQLite refuses all that follows, and opening the file anew
-    rolls back.
-    """
-    if connection.in_transaction:
-        try:
-            connection.execute("ROLLBACK")
-        except sqlite3.OperationalError:
-            return

@@ -10,7 +10,7 @@ from cogmap.errors import StorageError
 
 
 def open_file(path: Path) -> int:
-    """A descriptor to read and write the file at `path`, made where there is none.
+    """Return a descriptor to read and write the file at `path`, made if there is none.
 
     Raises StorageError.
     """

@@ -14,7 +14,8 @@ from cogmap.runtime.state.files import open_file, write_at
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 
-_HEAD = struct.Struct("<IIH")
+# The length of the body, its CRC-32, and the length of the topic's name in it.
+HEAD = struct.Struct("<IIH")
 COMPACT_BYTES = 64 * 2**20
 
 
@@ -32,55 +33,54 @@ class Journal:
         self._limit = COMPACT_BYTES
 
     def messages(self) -> Iterator[Message]:
-        """Everything written so far, oldest first.
+        """Return everything written so far, oldest first.
 
         Raises UsageError at a whole record that cannot be decoded.
         """
         while (body := self._body_at(self._size)) is not None:
             name_length, record = body
-            message = self._decoded(record[:name_length], record[name_length:])
-            self._size += _HEAD.size + len(record)
+            try:
+                topic = topics.BY_NAME[record[:name_length].decode()]
+                message = decode(topic, record[name_length:])
+            except (KeyError, UnicodeDecodeError, MessageError) as error:
+                raise UsageError(
+                    f"{self._path}: a record of another version cannot be read ({error}): "
+                    f"move the file away to start anew"
+                ) from None
+
+            self._size += HEAD.size + len(record)
             yield message
         os.ftruncate(self._file, self._size)
 
     def _body_at(self, offset: int) -> tuple[int, bytes] | None:
-        """The length of the topic's name, then name and payload; None where no whole record is."""
-        head = os.pread(self._file, _HEAD.size, offset)
-        if len(head) < _HEAD.size:
+        """The length of the topic's name, then name and payload; None if no whole record is."""
+        head = os.pread(self._file, HEAD.size, offset)
+        if len(head) < HEAD.size:
             return None
 
-        length, checksum, name_length = _HEAD.unpack(head)
-        body = os.pread(self._file, length, offset + _HEAD.size)
+        length, checksum, name_length = HEAD.unpack(head)
+        body = os.pread(self._file, length, offset + HEAD.size)
         if len(body) < length or zlib.crc32(body) != checksum:
             return None
         return name_length, body
-
-    def _decoded(self, name: bytes, payload: bytes) -> Message:
-        try:
-            return decode(topics.BY_NAME[name.decode()], payload)
-        except (KeyError, UnicodeDecodeError, MessageError) as error:
-            raise UsageError(
-                f"{self._path}: a record of another version cannot be read ({error}): "
-                f"move the file away to start anew"
-            ) from None
 
     def append(self, message: Message, payload: bytes) -> None:
         """Write `message`, whose bytes are `payload`; it survives this process from here on."""
         name = topics.of(message).name.encode()
         body = name + payload
-        head = _HEAD.pack(len(body), zlib.crc32(body), len(name))
+        head = HEAD.pack(len(body), zlib.crc32(body), len(name))
 
         write_at(self._path, self._file, head + body, self._size)
-        self._size += _HEAD.size + len(body)
+        self._size += HEAD.size + len(body)
 
     @property
     def is_empty(self) -> bool:
-        """Whether there was nothing to read, and nothing has been written."""
+        """True if there was nothing to read, and nothing has been written."""
         return self._size == 0
 
     @property
     def is_long(self) -> bool:
-        """Whether it is time to compact it."""
+        """True if it is time to compact it."""
         return self._size > self._limit
 
     def compact(self, message: Message) -> None:

@@ -16,7 +16,7 @@ def new_file(path: Path) -> Iterator[Path]:
     """Where to write a file that is to be at `path`, in a folder of its own beside it.
 
     Once the block has ended it is at `path`, whole and on the disk; nothing is there where the
-    block raises or the process is killed. Raises StorageError where there is a file already, which
+    block raises or the process is killed. Raises StorageError if there is a file already, which
     stays, and where the disk refuses.
     """
     if path.exists():

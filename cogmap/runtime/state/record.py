@@ -21,7 +21,7 @@ class Record(NamedTuple):
 def digest_of(record: Record, sequence: int) -> bytes:
     """BLAKE2b of key, sequence number, kind and payload, each with its length before it.
 
-    It has DIGEST_BYTES bytes. Raises UnicodeEncodeError where key or kind is no text.
+    It has DIGEST_BYTES bytes. Raises UnicodeEncodeError if key or kind is no text.
     """
     key = record.key.encode()
     kind = record.kind.encode()

@@ -28,12 +28,12 @@ UPGRADES: tuple[Upgrade, ...] = (
 
 
 def version() -> int:
-    """The version that all steps lead to."""
+    """Return the version that all steps lead to."""
     return len(UPGRADES)
 
 
 def version_of(connection: sqlite3.Connection) -> int:
-    """The version of a database's tables."""
+    """Return the version of a database's tables."""
     ((found,),) = connection.execute("PRAGMA user_version")
     return int(found)
 
@@ -48,13 +48,13 @@ def upgrade(connection: sqlite3.Connection) -> None:
 
 
 def is_as_made(connection: sqlite3.Connection) -> bool:
-    """Whether tables and indices are, to the letter, those that the steps make."""
+    """Return true if tables and indices are, to the letter, those that the steps make."""
     with closing(_made()) as made:
         return _objects(connection) == _objects(made)
 
 
 def empty_database() -> bytes:
-    """The file of a database without records."""
+    """Return the file of a database without records."""
     with closing(_made()) as made:
         return made.serialize()
 

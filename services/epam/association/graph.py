@@ -95,7 +95,17 @@ class AssociativeGraph:
         np.fill_diagonal(changed, 0.0)
         self._weights[between] = changed
 
-        self._attach(conscious)
+        # Links to feelings, from what is conscious: towards 1 to what is felt now, towards 0 to
+        # others.
+        columns = {self._index[name]: name for name in FEELINGS if name in self._index}
+        rows = [row for row in conscious if row not in columns]
+        for column, name in columns.items():
+            is_felt = column in conscious
+            wears_off = FEELINGS[name] is Feeling.NOVELTY
+            rate = FEELING_RATE if is_felt or wears_off else FEELING_UNLEARNING_RATE
+            felt_weights = self._weights[rows, column]
+            self._weights[rows, column] = felt_weights + rate * (float(is_felt) - felt_weights)
+
         for relation, name in stood.items():
             if relation in self._index and name in self._index:
                 weights = self._weights[self._index[relation]]
@@ -184,19 +194,6 @@ class AssociativeGraph:
         self._activations = np.array(kept.activations.numpy(), np.float64)
         self._weights = np.zeros((count, count))
         self._weights[sources, targets] = values
-
-    def _attach(self, conscious: list[int]) -> None:
-        """Change the weights of the links to feelings from what is conscious, by row: towards 1 to
-        what is felt now, towards 0 to the others.
-        """
-        columns = {self._index[name]: name for name in FEELINGS if name in self._index}
-        rows = [row for row in conscious if row not in columns]
-        for column, name in columns.items():
-            is_felt = column in conscious
-            wears_off = FEELINGS[name] is Feeling.NOVELTY
-            rate = FEELING_RATE if is_felt or wears_off else FEELING_UNLEARNING_RATE
-            weights = self._weights[rows, column]
-            self._weights[rows, column] = weights + rate * (float(is_felt) - weights)
 
     def _remaining_share(self, stamp_ns: int) -> float:
         """The share of activation that remains at `stamp_ns`."""

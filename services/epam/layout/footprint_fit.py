@@ -38,7 +38,7 @@ MIN_BEARING_SD_RAD = 0.003
 MIN_RANGE_SD_M = 0.1
 HIDDEN_SD_M = 0.2
 # Largest step of one iteration: x and z in metres, orientation in radians.
-MAX_STEP = (5, 5, 0.4)
+MAX_STEP = np.array([5, 5, 0.4])
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,13 @@ def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
     damping = np.full(len(best), FIRST_DAMPING)
 
     for _ in range(ITERATIONS):
-        candidate = best - _damped_step(residuals, jacobian, damping)
+        weighted, normal = _weighted_normal(jacobian, _huber_weight(residuals))
+        gradient = np.einsum("sri,sr->si", weighted, residuals)
+        added = np.einsum("sii->si", normal) * damping[:, None] + 1e-9
+        damped = normal + added[:, :, None] * np.eye(3)
+        step = np.linalg.solve(damped, gradient[..., None])[..., 0]
+
+        candidate = best - step.clip(-MAX_STEP, MAX_STEP)
         new_residuals, new_jacobian = linearized(candidate, copies)
         cost = _huber_cost(new_residuals)
 
@@ -190,20 +196,6 @@ def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
         normal=normal,
         bias_gradient=of_columns * bias_share[:, None],
     )
-
-
-def _damped_step(residuals: Floats, jacobian: Floats, damping: Floats) -> Floats:
-    """The step (s, 3) to subtract, at most MAX_STEP."""
-    weighted, normal = _weighted_normal(jacobian, _huber_weight(residuals))
-    gradient = np.einsum("sri,sr->si", weighted, residuals)
-
-    diagonal = np.einsum("sii->si", normal)
-    added = diagonal * damping[:, None] + 1e-9
-    damped = normal + added[:, :, None] * np.eye(3)
-
-    solved = np.linalg.solve(damped, gradient[..., None])
-    largest = np.array(MAX_STEP)
-    return np.asarray(solved[..., 0].clip(-largest, largest))
 
 
 def _weighted_normal(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats]:

@@ -39,7 +39,7 @@ class FootprintProblem:
     camera: Calibration
 
     def take(self, rows: npt.NDArray[np.intp]) -> FootprintProblem:
-        """The problem of these rows, each of which may be taken several times."""
+        """Return the problem of these rows, each of which may be taken several times."""
         return FootprintProblem(
             self.slope[rows],
             self.disparity_px[rows],
@@ -52,7 +52,9 @@ class FootprintProblem:
         )
 
     def copies(self) -> FootprintProblem:
-        """The problem as `linearized` takes it: once as it is, and once for each derivative."""
+        """Return the problem as `linearized` takes it: once as it is, and once for each
+        derivative.
+        """
         every_row = np.arange(len(self.slope))
         return self.take(np.tile(every_row, 1 + len(STEPS)))
 

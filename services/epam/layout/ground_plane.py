@@ -41,12 +41,12 @@ class GroundPlane:
     def disparity_px(
         self, rows: npt.ArrayLike, columns: npt.ArrayLike, camera: Calibration
     ) -> Floats:
-        """The disparity at each of these pixels; at most 0 at and over the horizon."""
+        """Return the disparity at each of these pixels; at most 0 at and over the horizon."""
         right, below = ray_slopes(rows, columns, camera)
         return self.across * right + self.down * below + self.level
 
     def disparity_image_px(self, size: tuple[int, ...], camera: Calibration) -> Floats:
-        """The disparity at each pixel of an image of `size` (h, w)."""
+        """Return the disparity at each pixel of an image of `size` (h, w)."""
         height, width = size
         rows = np.arange(height)[:, None]
         columns = np.arange(width)
@@ -93,7 +93,7 @@ def focal_baseline(camera: Calibration) -> float:
 def ray_slopes(
     rows: npt.ArrayLike, columns: npt.ArrayLike, camera: Calibration
 ) -> tuple[Floats, Floats]:
-    """The slopes of the pixels' rays to the right and downwards."""
+    """Return the slopes of the pixels' rays to the right and downwards."""
     right = (np.asarray(columns, np.float64) - camera.cx_px) / camera.fx_px
     below = (np.asarray(rows, np.float64) - camera.cy_px) / camera.fy_px
     return right, below

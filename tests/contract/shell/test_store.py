@@ -13,13 +13,15 @@ from cogmap.runtime.state.database import Database
 from cogmap.runtime.state.record import Record
 from cogmap.runtime.state.store import Store
 from cogmap.schemas import topics
-from cogmap.schemas.examples import memory
+from cogmap.schemas.examples import example
 from cogmap.schemas.memory import Restored, Stored, StoredRecord
 from cogmap.schemas.sensing import Odometry
 from cogmap.testing import odometry
 from tests.support.system.networks import Network, Peer, meet, publish, spin_until
 
-RECORDS = memory.stored().records
+STORED = example(topics.STORED)
+assert isinstance(STORED, Stored)
+RECORDS = STORED.records
 
 
 class Run:
