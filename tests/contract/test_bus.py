@@ -17,7 +17,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.examples import example_messages
 from cogmap.schemas.process import Clock
 from cogmap.schemas.topics import Delivery
-from tests.support.logs import odometry
+from cogmap.testing import odometry
 from tests.support.system.networks import TIMEOUT_S, Network, OverZenoh, Peer, meet, publish
 
 MESSAGES = {topics.of(message): message for message in example_messages()}

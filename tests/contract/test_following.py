@@ -17,7 +17,7 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta, DropNode, Link, Operation, Phase, SnapshotRequest
 from cogmap.schemas.nodes import Node
 from cogmap.schemas.sensing import MotorCommand
-from tests.support.logs import odometry
+from cogmap.testing import odometry
 from tests.support.system.networks import (
     TIMEOUT_S,
     Network,

@@ -17,8 +17,8 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.nodes import Node
 from cogmap.schemas.sensing import MotorCommand, Odometry
+from cogmap.testing import odometry
 from tests.support.includes import ROOT
-from tests.support.logs import odometry
 from tests.support.reference import REFERENCE
 from tests.support.system.networks import OverZenoh, Peer, await_members, publish
 

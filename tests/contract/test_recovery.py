@@ -16,7 +16,7 @@ from cogmap.runtime.shell import Shell
 from cogmap.schemas import topics
 from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.nodes import Node
-from tests.support.logs import odometry
+from cogmap.testing import odometry
 from tests.support.system.networks import OverZenoh, Peer, meet, publish, spin_until, working
 
 

@@ -23,7 +23,8 @@ from cogmap.recording.recorder import Recorder
 from cogmap.recording.storage.format import topics_to_record
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
-from tests.support.logs import SECOND_NS, odometry, scan, write_log
+from cogmap.testing import odometry
+from tests.support.logs import SECOND_NS, scan, write_log
 from tests.support.system.commands import log_command, log_facts
 from tests.support.system.networks import routed
 

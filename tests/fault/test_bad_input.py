@@ -19,11 +19,11 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.sensing import Percepts, SelfMotion
 from cogmap.schemas.topics import Delivery
+from cogmap.testing import percept
 from tests.support.damage import damaged
 from tests.support.system.live import Witness
 from tests.support.system.networks import working
 from tests.support.system.processes import AGENT, System, wait_until
-from tests.support.world.scenes import percept
 
 TRAVELLING = [topic for topic in topics.ALL if topic.delivery is not Delivery.ON_REQUEST]
 VIEWS = len(TRAVELLING)

@@ -21,7 +21,7 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.recording.storage.reader import LogReader, Record
 from cogmap.recording.storage.recover import recover
 from cogmap.schemas import topics
-from tests.support.logs import odometry
+from cogmap.testing import odometry
 from tests.support.system.disks import full_after
 from tests.support.system.networks import routed
 

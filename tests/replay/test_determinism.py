@@ -16,7 +16,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta
 from cogmap.schemas.topics import Delivery, Topic
-from tests.support.messages import of_type
+from cogmap.testing import of_type
 from tests.support.reference import COMPARED, Published, drive, graph
 
 FRAMES = 8

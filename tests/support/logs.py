@@ -13,7 +13,7 @@ from cogmap.recording.storage.writer import LogWriter
 from cogmap.schemas import topics
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
-from cogmap.schemas.sensing import Odometry, RangeScan
+from cogmap.schemas.sensing import RangeScan
 
 SECOND_NS = 10**9
 ABOUT = {"agent": "a", "config": "{}", "began_ns": "1"}
@@ -28,20 +28,6 @@ def write_log(path: Path, rows: Iterable[Row], *, incarnation: int = 1, **about:
         writer.write(topics.of(message), encode(message), envelope, at_ns)
     writer.close()
     return path
-
-
-def odometry(
-    seq: int, *, stamp_ns: int = 0, source: str = "sim", speed_m_s: float = 1.0, dt_s: float = 0.05
-) -> Odometry:
-    """Wheels that roll straight ahead."""
-    return Odometry(
-        seq=seq,
-        stamp_ns=stamp_ns,
-        source=source,
-        speed_m_s=speed_m_s,
-        turn_rate_rad_s=0.0,
-        dt_s=dt_s,
-    )
 
 
 def scan(seq: int, *, stamp_ns: int = 0, values: Array | None = None) -> RangeScan:

@@ -9,7 +9,7 @@ from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from cogmap.schemas import topics
 from cogmap.schemas.sensing import MotorCommand, Odometry
-from tests.support.logs import odometry
+from cogmap.testing import odometry
 from tests.support.system.networks import Network, Peer, meet, next_health, publish, spin_until
 
 

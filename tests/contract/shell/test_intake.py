@@ -17,8 +17,8 @@ from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock
 from cogmap.schemas.topics import Delivery, Topic
+from cogmap.testing import odometry
 from tests.support.damage import damaged, golden
-from tests.support.logs import odometry
 from tests.support.system.networks import Network, Peer, envelope_of, meet, publish, spin_until
 
 RECEIVED = [

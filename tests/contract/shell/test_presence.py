@@ -8,7 +8,7 @@ from cogmap.runtime.shell import Shell
 from cogmap.schemas import topics
 from cogmap.schemas.process import Presence
 from cogmap.schemas.sensing import Odometry
-from tests.support.logs import odometry
+from cogmap.testing import odometry
 from tests.support.system.networks import Network, spin_until
 
 COUNT = 20

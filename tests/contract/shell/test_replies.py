@@ -13,7 +13,7 @@ from cogmap.runtime.shell import Shell
 from cogmap.schemas import topics
 from cogmap.schemas.graph import Decay, Snapshot, SnapshotRequest
 from cogmap.schemas.sensing import MotorCommand, Odometry
-from tests.support.logs import odometry
+from cogmap.testing import odometry
 from tests.support.system.networks import (
     TIMEOUT_S,
     Network,

@@ -16,7 +16,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.examples import example
 from cogmap.schemas.memory import Restored, Stored, StoredRecord
 from cogmap.schemas.sensing import Odometry
-from tests.support.logs import odometry
+from cogmap.testing import odometry
 from tests.support.system.networks import Network, Peer, meet, publish, spin_until
 
 STORED = example(topics.STORED)

@@ -15,7 +15,7 @@ from cogmap.schemas.cognition import (
     Relation,
 )
 from cogmap.schemas.nodes import Object, PathIntegration, Self, object_id
-from tests.support.world.scenes import PERIOD_NS, agent
+from cogmap.testing import PERIOD_NS, agent
 
 TOWN_M = {"bakery": 20 + 5j, "school": 25 - 8j, "library": 40 + 2j, "museum": 60 - 6j}
 """Where things stand, in metres, x + y x i."""

@@ -11,7 +11,8 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Operation
 from cogmap.schemas.nodes import Object, Self
 from cogmap.services.codelets.config import Config
-from tests.support.world.scenes import graph_of, landmark, run, task
+from cogmap.testing import graph_of, landmark, task
+from tests.support.world.scenes import run
 
 EXACT = Config(samples=4000, kept_samples=2000, correlated_views=1.0)
 Row = tuple[float, float, float, float, float]

@@ -10,7 +10,8 @@ import numpy as np
 from cogmap.runtime.run import LOCKSTEP, Run
 from cogmap.schemas.sensing import Percept, Percepts, PlaceMatch
 from cogmap.services.codelets.module import Config as WorkerConfig
-from tests.support.world.scenes import Desk, Rows, motion, percept, percepts, stamp_ns
+from cogmap.testing import Rows, percept_at, percepts, self_motion, stamp_ns
+from tests.support.world.scenes import Desk
 
 STEP_M = 2.0
 SIDE_STEPS = 20
@@ -51,11 +52,7 @@ def true_poses(frames: int) -> np.ndarray:
 
 def seen(pose: np.ndarray, label: str, position_m: Position) -> Percept:
     """A landmark as seen without error."""
-    x_m, y_m = np.array(position_m) - pose[:2]
-    range_m = float(np.hypot(x_m, y_m))
-    direction_rad = math.atan2(y_m, x_m)
-    bearing_rad = math.remainder(direction_rad - pose[2], 2 * math.pi)
-    return percept(label, bearing_rad, range_m, bearing_sd_rad=0.01, range_sd_m=0.2)
+    return percept_at(pose, label, position_m, bearing_sd_rad=0.01, range_sd_m=0.2)
 
 
 class LoopDrive:
@@ -83,7 +80,7 @@ class LoopDrive:
                 seen_again = PlaceMatch(frame=match, view_ns=stamp_ns(match), score=0.99)
                 view = msgspec.structs.replace(view, matches=[seen_again])
 
-            self.desk.feed(motion(self.frame, self._rows()))
+            self.desk.feed(self_motion(self.frame, self._rows()))
             self.desk.feed(view)
             self.desk.work()
             self.frame += 1

@@ -28,8 +28,7 @@ from cogmap.schemas.nodes import (
 from cogmap.services.memory.episodic.config import EpisodicConfig
 from cogmap.services.memory.module import Config, build
 from cogmap.services.memory.sparse.config import SparseConfig
-from tests.support.messages import of_type
-from tests.support.world.scenes import agent
+from cogmap.testing import agent, of_type
 
 S = 10**9
 SPARSE = SparseConfig(hard_locations=1000, dimensions=512)

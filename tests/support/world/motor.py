@@ -12,22 +12,15 @@ from cogmap.schemas.cognition import Action, ActionName, Competition, Trigger
 from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.sensing import MotorCommand, RangeScan, SelfMotion
 from cogmap.services.motor.module import Config, build
-from tests.support.messages import of_type
+from cogmap.testing import agent, of_type, range_scan
 from tests.support.world.plans import Point, joined, plan_along
-from tests.support.world.scenes import agent
 
 PERIOD_NS = 200_000_000
 
 
 def scan_of(*obstacles: tuple[float, float], cycle: int = 1) -> RangeScan:
     """A range scan with obstacles at these bearings and ranges."""
-    bearing_rad, range_m = np.array(obstacles, np.float32).reshape(-1, 2).T
-    return RangeScan(
-        stamp_ns=cycle * PERIOD_NS,
-        frame=cycle,
-        bearing_rad=Array.of(bearing_rad),
-        range_m=Array.of(range_m),
-    )
+    return range_scan(*obstacles, frame=cycle, stamp_ns=cycle * PERIOD_NS)
 
 
 def module_ahead(run: Run = REAL_TIME, length_m: float = 20.0) -> Module:

@@ -23,39 +23,8 @@ from cogmap.services.codelets.module import Config as WorkerConfig
 from cogmap.services.codelets.module import build as build_worker
 from cogmap.services.codelets.table import own_codelets
 from cogmap.services.workspace.module import Config, build
-from cogmap.testing import (
-    PERIOD_NS,
-    Rows,
-    agent,
-    graph_of,
-    landmark,
-    percept,
-    percepts,
-    run_codelet,
-    stamp_ns,
-    task,
-)
-from cogmap.testing import self_motion as motion
+from cogmap.testing import Rows, percepts, run_codelet, self_motion
 from cogmap.testing.builders import STRAIGHT
-
-__all__ = [
-    "PERIOD_NS",
-    "Desk",
-    "Rows",
-    "agent",
-    "answer",
-    "configured",
-    "graph_of",
-    "landmark",
-    "motion",
-    "percept",
-    "percepts",
-    "received",
-    "run",
-    "stamp_ns",
-    "task",
-    "thing",
-]
 
 
 def thing(name: str) -> Node:
@@ -157,7 +126,7 @@ class Desk:
 
     def see(self, frame: int, *objects: Percept, rows: Rows = STRAIGHT, road_m: Rows = ()) -> None:
         """A view and the motion up to it."""
-        self.feed(motion(frame, rows))
+        self.feed(self_motion(frame, rows))
         self.feed(percepts(frame, *objects, road_m=road_m))
 
     def take(self) -> list[Task]:

@@ -15,7 +15,8 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.nodes import Self
 from cogmap.services.codelets.config import Config
-from tests.support.world.scenes import agent, run, task
+from cogmap.testing import agent, task
+from tests.support.world.scenes import run
 
 HALF_VIEW_RAD = math.radians(37)
 RAYS = 32

@@ -8,7 +8,7 @@ from cogmap.graph.graph import Graph
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Cells, Operation
 from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn
-from tests.support.world.scenes import agent
+from cogmap.testing import agent
 
 SOUTH = (0, 60, -3, 3)
 EAST = (54, 60, -3, 43)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import msgspec
@@ -21,11 +22,11 @@ from benchmarks.explore.trials import (
     sees_barrier,
     street_to_close,
 )
-from cogmap.graph.graph import Graph
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Cells
-from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn
+from cogmap.schemas.nodes import PlaceColumn
 from cogmap.schemas.sensing import Street, TrueTown
+from cogmap.testing import cells, graph_of
 
 ORIGIN = np.zeros(3)
 CORNERS = ((0.0, 0.0), (60.0, 0.0), (60.0, 40.0), (0.0, 40.0))
@@ -40,16 +41,8 @@ def _town() -> TrueTown:
     return TrueTown(seed=1, streets=streets, buildings=[], kerbs_m=Array.of(kerbs_m))
 
 
-def _graph(*cells: Cells) -> Graph:
-    graph = Graph()
-    graph.change([Map(id=ROOT_MAP, cell_m=1.0), *cells])
-    return graph
-
-
 def _cells(column: PlaceColumn, i: range, j: range, value: float) -> Cells:
-    where = np.array([(each_i, each_j) for each_i in i for each_j in j], np.int32)
-    values = np.full(len(where), value, np.float32)
-    return Cells(column=column, cells=Array.of(where), values=Array.of(values))
+    return cells(column, dict.fromkeys(itertools.product(i, j), value))
 
 
 def _trial(driven_m: float | None, closed: str = "") -> Trial:
@@ -159,15 +152,15 @@ def test_a_square_is_not_closed() -> None:
 def test_explored_is_what_the_map_has_as_road() -> None:
     south = _cells(PlaceColumn.ROAD, range(61), range(-2, 3), 1.0)
 
-    assert explored_share(_graph(south), _town(), ORIGIN) == pytest.approx(0.3, abs=0.05)
-    assert explored_share(_graph(), _town(), ORIGIN) == 0.0
+    assert explored_share(graph_of(south), _town(), ORIGIN) == pytest.approx(0.3, abs=0.05)
+    assert explored_share(graph_of(), _town(), ORIGIN) == 0.0
 
 
 def test_the_links_of_a_map_are_judged_in_the_frame_of_its_agent() -> None:
     kerb = _cells(PlaceColumn.WEIGHT_N, range(-29, 30), range(-4, -3), 0.0)
     seen = _cells(PlaceColumn.EVIDENCE_N, range(-29, 30), range(-4, 3), -1.0)
     start = np.array([30.0, 0.0, 0.0])
-    found = score_boundaries(_graph(kerb, seen), _town(), start)
+    found = score_boundaries(graph_of(kerb, seen), _town(), start)
 
     assert found.precision == 1.0
     assert found.recall > 0.9

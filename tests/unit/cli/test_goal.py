@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from cogmap.cli.goal import goal, parsed, plan_json, plan_text, read_goals
 from cogmap.errors import UsageError
 from cogmap.schemas.nodes import PLAN_ID, Object, Plan, PlanState, goal_id, object_id
-from tests.support.world.scenes import graph_of
+from cogmap.testing import graph_of
 
 
 def test_two_numbers_are_a_position_and_other_words_names() -> None:

@@ -33,17 +33,8 @@ from cogmap.schemas.sensing import PlaceMatch
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.module import build
 from cogmap.services.codelets.table import own_codelets
-from tests.support.messages import of_type
-from tests.support.world.scenes import (
-    agent,
-    configured,
-    graph_of,
-    landmark,
-    percept,
-    run,
-    task,
-    thing,
-)
+from cogmap.testing import agent, graph_of, landmark, of_type, percept, task
+from tests.support.world.scenes import configured, run, thing
 
 CONFIG = Config(samples=60, kept_samples=30, landmark_samples=40)
 

@@ -12,7 +12,7 @@ from cogmap.schemas.sensing import Associations
 from cogmap.services.epam.association.graph import MAX_NODES, AssociativeGraph
 from cogmap.services.epam.association.memory import BEHIND, Primer
 from cogmap.services.epam.config import Priming
-from tests.support.world.scenes import percept
+from cogmap.testing import percept
 
 SECOND_NS = 1_000_000_000
 CONFIG = Priming()

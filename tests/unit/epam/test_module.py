@@ -24,8 +24,8 @@ from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.nodes import Object, object_id
 from cogmap.schemas.sensing import Learned, Percepts, View
 from cogmap.services.epam.module import Config, build
+from cogmap.testing import of_type
 from cogmap.training.rendering.towns import render_town
-from tests.support.messages import of_type
 from tests.support.world.blocks import CAMERA
 from tests.support.world.rendered import seen
 

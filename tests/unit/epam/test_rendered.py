@@ -13,8 +13,8 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import Building, Learned, Percept, Percepts
 from cogmap.services.epam.module import Config, build
 from cogmap.services.sim.layout import town
+from cogmap.testing import of_type
 from cogmap.training.rendering.towns import Views, render_town
-from tests.support.messages import of_type
 from tests.support.world.rendered import seen
 
 SEED = 4003

@@ -5,18 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.bus.codec import encode
-from cogmap.graph.graph import Graph
-from cogmap.schemas.graph import DropLink, DropNode, Link, Links, Operation
+from cogmap.schemas.graph import DropLink, DropNode, Link, Links
 from cogmap.schemas.nodes import LinkKind
+from cogmap.testing import graph_of
 from tests.support.world.scenes import thing
 
 NEAR = "near"
-
-
-def _graph(*operations: Operation) -> Graph:
-    graph = Graph()
-    graph.change(list(operations))
-    return graph
 
 
 def _link(source: str, target: str, weight: float = 1.0, kind: str = NEAR) -> Link:
@@ -26,7 +20,7 @@ def _link(source: str, target: str, weight: float = 1.0, kind: str = NEAR) -> Li
 def test_links_in_bulk_are_the_links_that_they_list() -> None:
     of_a = {"c": 0.25, "b": 1.0}
     of_b = {"c": 0.5}
-    graph = _graph(Links(kind=NEAR, weights={"b": of_b, "a": of_a}))
+    graph = graph_of(Links(kind=NEAR, weights={"b": of_b, "a": of_a}))
     (written,) = graph.snapshot().links
 
     assert graph.links.targets("a", NEAR) == of_a
@@ -35,7 +29,7 @@ def test_links_in_bulk_are_the_links_that_they_list() -> None:
 
 
 def test_links_in_bulk_note_the_source_of_those_that_are_new_alone() -> None:
-    graph = _graph(
+    graph = graph_of(
         Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 1.0}}),
         Links(kind=NEAR, weights={"z": {"d": 1.0, "e": 1.0}}),
         Links(kind=NEAR, weights={"a": {"d": 1.0, "b": 0.5, "e": 1.0}}),
@@ -48,7 +42,7 @@ def test_links_in_bulk_note_the_source_of_those_that_are_new_alone() -> None:
 
 
 def test_links_in_bulk_leave_other_links_of_their_source() -> None:
-    graph = _graph(
+    graph = graph_of(
         _link("a", "here", 0.5),
         Links(kind=NEAR, weights={"a": {"there": 1.0}}),
         DropLink(source="a", target="there", kind=NEAR),
@@ -62,8 +56,8 @@ def test_links_applied_twice_are_links_applied_once() -> None:
     links = Links(kind=NEAR, weights={"a": {"b": 0.5}})
     at = _link("a", "place:map:0:1:2", kind=LinkKind.AT)
 
-    once = _graph(links, at)
-    twice = _graph(links, at, links, at)
+    once = graph_of(links, at)
+    twice = graph_of(links, at, links, at)
 
     assert twice.digest() == once.digest()
 
@@ -72,7 +66,7 @@ def test_a_node_has_one_link_of_an_exclusive_kind() -> None:
     a_here = _link("a", "here", kind=LinkKind.AT)
     b_here = _link("b", "here", kind=LinkKind.AT)
     a_there = _link("a", "there", 0.5, kind=LinkKind.AT)
-    links = _graph(a_here, b_here, a_there).links
+    links = graph_of(a_here, b_here, a_there).links
 
     assert links.targets("a", LinkKind.AT) == {"there": 0.5}
     assert links.target("a", LinkKind.AT) == "there"
@@ -82,8 +76,8 @@ def test_a_node_has_one_link_of_an_exclusive_kind() -> None:
 
 def test_links_of_an_exclusive_kind_are_in_bulk_what_they_are_one_by_one() -> None:
     rng = np.random.default_rng(3)
-    one_by_one = _graph()
-    in_bulk = _graph()
+    one_by_one = graph_of()
+    in_bulk = graph_of()
     for _ in range(30):
         weights = {}
         for source in rng.permutation(12)[: rng.integers(1, 12)].tolist():
@@ -101,7 +95,7 @@ def test_links_of_an_exclusive_kind_are_in_bulk_what_they_are_one_by_one() -> No
 
 
 def test_of_several_links_of_an_exclusive_kind_in_bulk_the_last_one_is_kept() -> None:
-    links = _graph(Links(kind=LinkKind.AT, weights={"a": {"here": 1.0, "there": 0.5}})).links
+    links = graph_of(Links(kind=LinkKind.AT, weights={"a": {"here": 1.0, "there": 0.5}})).links
 
     assert links.targets("a", LinkKind.AT) == {"there": 0.5}
     assert links.sources("here", LinkKind.AT) == ()
@@ -109,7 +103,7 @@ def test_of_several_links_of_an_exclusive_kind_in_bulk_the_last_one_is_kept() ->
 
 
 def test_dropping_a_link_that_is_not_there_changes_nothing() -> None:
-    graph = _graph(_link("a", "b"), _link("a", "here", kind=LinkKind.AT))
+    graph = graph_of(_link("a", "b"), _link("a", "here", kind=LinkKind.AT))
     before = graph.digest()
 
     other_target = DropLink(source="a", target="c", kind=NEAR)
@@ -125,7 +119,7 @@ def test_a_forgotten_node_takes_links_to_it_and_from_it_along() -> None:
     near = Links(kind=NEAR, weights=weights)
     at = _link("b", "here", kind=LinkKind.AT)
     instance = _link("e", "b", kind=LinkKind.INSTANCE)
-    graph = _graph(thing("a"), thing("b"), near, at, instance, DropNode(id="b"))
+    graph = graph_of(thing("a"), thing("b"), near, at, instance, DropNode(id="b"))
 
     assert graph.snapshot().links == [Links(kind=NEAR, weights={"a": {"c": 0.25}})]
     assert graph.links.sources("here", LinkKind.AT) == ()
@@ -136,6 +130,6 @@ def test_a_message_in_the_graph_is_not_changed_by_the_next_one() -> None:
     second = Links(kind=NEAR, weights={"a": {"b": 1.0, "c": 1.0}})
 
     before = encode(first)
-    _graph(first, second, _link("a", "d"))
+    graph_of(first, second, _link("a", "d"))
 
     assert encode(first) == before

@@ -8,23 +8,9 @@ import pytest
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.schemas.array import Array
-from cogmap.schemas.graph import Cells, Decay, DropNode, DropPlaces, Operation, PlaceTile
+from cogmap.schemas.graph import Decay, DropNode, DropPlaces, Operation, PlaceTile
 from cogmap.schemas.nodes import ROOT_MAP, TILE_SIDE, Map, PlaceColumn
-
-
-def _cells(
-    column: PlaceColumn, written: dict[tuple[int, int], float], map_id: str = ROOT_MAP
-) -> Cells:
-    """Values of a column by cell."""
-    cells = np.array(list(written), np.int32)
-    values = np.array(list(written.values()), np.float32)
-    return Cells(map=map_id, column=column, cells=Array.of(cells), values=Array.of(values))
-
-
-def _graph(*operations: Operation) -> Graph:
-    graph = Graph()
-    graph.change(list(operations))
-    return graph
+from cogmap.testing import cells, graph_of
 
 
 def _weights(graph: Graph, i: int, j: int) -> dict[str, float]:
@@ -33,7 +19,7 @@ def _weights(graph: Graph, i: int, j: int) -> dict[str, float]:
 
 
 def test_a_tile_comes_into_being_with_its_first_cell() -> None:
-    graph = _graph(_cells(PlaceColumn.ROAD, {(-1, TILE_SIDE): 0.5}))
+    graph = graph_of(cells(PlaceColumn.ROAD, {(-1, TILE_SIDE): 0.5}))
     assert list(graph.places.tiles) == [(ROOT_MAP, -1, 1)]
     assert graph.place(0, 0) is None
 
@@ -45,14 +31,14 @@ def test_a_tile_comes_into_being_with_its_first_cell() -> None:
 
 
 def test_a_graph_without_place_nodes_follows_all_else() -> None:
-    whole = _graph(
+    whole = graph_of(
         Map(id=ROOT_MAP, cell_m=2.0),
-        _cells(PlaceColumn.ROAD, {(2, 3): 1.0}),
-        _cells(PlaceColumn.OBSTACLE, {(0, 0): 1.0}),
+        cells(PlaceColumn.ROAD, {(2, 3): 1.0}),
+        cells(PlaceColumn.OBSTACLE, {(0, 0): 1.0}),
     )
     without = Graph(with_places=False)
     without.load(whole.snapshot())
-    without.change([_cells(PlaceColumn.ROAD, {(2, 4): 1.0})])
+    without.change([cells(PlaceColumn.ROAD, {(2, 4): 1.0})])
 
     assert whole.place(2, 3) is not None
     assert not without.places.tiles
@@ -61,7 +47,7 @@ def test_a_graph_without_place_nodes_follows_all_else() -> None:
 
 def test_maps_have_place_nodes_of_their_own() -> None:
     coarse = Map(id="map:1", cell_m=4.0, parent=ROOT_MAP)
-    graph = _graph(coarse, _cells(PlaceColumn.ROAD, {(2, 3): 1.0}, "map:1"))
+    graph = graph_of(coarse, cells(PlaceColumn.ROAD, {(2, 3): 1.0}, "map:1"))
     place = graph.place(2, 3, "map:1")
 
     assert place is not None
@@ -72,8 +58,8 @@ def test_maps_have_place_nodes_of_their_own() -> None:
 @pytest.mark.parametrize("drop", [DropNode(id="map:1"), DropPlaces(map="map:1")])
 def test_place_nodes_of_a_map_are_forgotten_with_it_or_alone(drop: Operation) -> None:
     coarse = Map(id="map:1", cell_m=4.0, parent=ROOT_MAP)
-    own = _cells(PlaceColumn.ROAD, {(2, 3): 1.0}, "map:1")
-    graph = _graph(coarse, own, _cells(PlaceColumn.ROAD, {(2, 3): 1.0}), drop)
+    own = cells(PlaceColumn.ROAD, {(2, 3): 1.0}, "map:1")
+    graph = graph_of(coarse, own, cells(PlaceColumn.ROAD, {(2, 3): 1.0}), drop)
 
     assert graph.place(2, 3, "map:1") is None
     assert graph.place(2, 3) is not None
@@ -81,11 +67,11 @@ def test_place_nodes_of_a_map_are_forgotten_with_it_or_alone(drop: Operation) ->
 
 
 def test_a_snapshot_keeps_the_place_nodes_of_each_map_apart() -> None:
-    graph = _graph(
+    graph = graph_of(
         Map(id="map:1", cell_m=4.0, parent=ROOT_MAP),
-        _cells(PlaceColumn.ROAD, {(2, 3): 1.0}),
-        _cells(PlaceColumn.OBSTACLE, {(2, 3): 0.5}, "map:1"),
-        _cells(PlaceColumn.EVIDENCE_N, {(-9, 40): -3.0}, "map:1"),
+        cells(PlaceColumn.ROAD, {(2, 3): 1.0}),
+        cells(PlaceColumn.OBSTACLE, {(2, 3): 0.5}, "map:1"),
+        cells(PlaceColumn.EVIDENCE_N, {(-9, 40): -3.0}, "map:1"),
     )
     again = Graph()
     again.load(graph.snapshot())
@@ -99,11 +85,11 @@ def test_a_snapshot_keeps_the_place_nodes_of_each_map_apart() -> None:
 
 def test_the_activation_of_a_sub_maps_place_nodes_decays_as_the_roots_does() -> None:
     fine = Map(id="map:1", cell_m=0.5, parent=ROOT_MAP)
-    graph = _graph(
+    graph = graph_of(
         Decay(place_activation=0.1),
         fine,
-        _cells(PlaceColumn.ACTIVATION, {(2, 3): 1.0}),
-        _cells(PlaceColumn.ACTIVATION, {(2, 3): 1.0}, "map:1"),
+        cells(PlaceColumn.ACTIVATION, {(2, 3): 1.0}),
+        cells(PlaceColumn.ACTIVATION, {(2, 3): 1.0}, "map:1"),
     )
     graph.cycle = 4
     here = graph.place(2, 3)
@@ -115,11 +101,11 @@ def test_the_activation_of_a_sub_maps_place_nodes_decays_as_the_roots_does() -> 
 
 
 def test_each_of_the_eight_links_of_a_place_node_is_kept_once() -> None:
-    graph = _graph(
-        _cells(PlaceColumn.WEIGHT_E, {(5, 5): 0.1}),
-        _cells(PlaceColumn.WEIGHT_NE, {(5, 5): 0.2}),
-        _cells(PlaceColumn.WEIGHT_N, {(5, 5): 0.3}),
-        _cells(PlaceColumn.WEIGHT_NW, {(5, 5): 0.4}),
+    graph = graph_of(
+        cells(PlaceColumn.WEIGHT_E, {(5, 5): 0.1}),
+        cells(PlaceColumn.WEIGHT_NE, {(5, 5): 0.2}),
+        cells(PlaceColumn.WEIGHT_N, {(5, 5): 0.3}),
+        cells(PlaceColumn.WEIGHT_NW, {(5, 5): 0.4}),
     )
     weights = _weights(graph, 5, 5)
 
@@ -135,23 +121,23 @@ def test_each_of_the_eight_links_of_a_place_node_is_kept_once() -> None:
 
 
 def test_links_lead_to_place_nodes_that_exist_alone() -> None:
-    graph = _graph(_cells(PlaceColumn.ROAD, {(0, 0): 1.0}))
+    graph = graph_of(cells(PlaceColumn.ROAD, {(0, 0): 1.0}))
     targets = set(_weights(graph, 0, 0))
 
     assert targets == {"place:map:0:1:0", "place:map:0:1:1", "place:map:0:0:1"}
 
 
 def test_written_cells_are_those_whose_value_is_not_zero() -> None:
-    graph = _graph(_cells(PlaceColumn.ROAD, {(40, -3): 0.5, (1, 1): 1.0, (2, 2): 0.0}))
-    cells, values = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
-    where = [tuple(cell) for cell in cells.tolist()]
+    graph = graph_of(cells(PlaceColumn.ROAD, {(40, -3): 0.5, (1, 1): 1.0, (2, 2): 0.0}))
+    found, values = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
+    where = [tuple(cell) for cell in found.tolist()]
     found = dict(zip(where, values.tolist(), strict=True))
 
     assert found == {(40, -3): 0.5, (1, 1): 1.0}
 
 
 def test_a_snapshot_has_the_columns_that_were_written() -> None:
-    graph = _graph(_cells(PlaceColumn.ROAD, {(0, 0): 1.0}))
+    graph = graph_of(cells(PlaceColumn.ROAD, {(0, 0): 1.0}))
     snapshot = graph.snapshot()
     (tile,) = snapshot.tiles
     assert list(tile.columns) == [PlaceColumn.ROAD]
@@ -166,4 +152,4 @@ def test_a_tile_of_another_side_is_rejected() -> None:
     tile = PlaceTile(x=0, y=0, columns={PlaceColumn.ROAD: column})
 
     with pytest.raises(MessageError, match="road of shape"):
-        _graph(tile)
+        graph_of(tile)

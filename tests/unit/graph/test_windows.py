@@ -7,33 +7,18 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.graph.crossings import crossings
-from cogmap.graph.graph import Graph
 from cogmap.graph.window import EVIDENCE_COLUMNS, LINK_OFFSETS, WEIGHT_COLUMNS, Extent
-from cogmap.schemas.array import Array
-from cogmap.schemas.graph import Cells
 from cogmap.schemas.nodes import ROOT_MAP, TILE_SIDE, Map, PlaceColumn
+from cogmap.testing import cells, graph_of
 
 FAR = 2**19
 Link = tuple[int, int, int]
 
 
-def _cells(column: PlaceColumn, i: int, j: int, value: float, map_id: str = ROOT_MAP) -> Cells:
-    """One cell's value in a column."""
-    cells = Array.of(np.array([[i, j]], np.int32))
-    values = Array.of(np.array([value], np.float32))
-    return Cells(map=map_id, column=column, cells=cells, values=values)
-
-
-def _graph(*operations: Cells | Map) -> Graph:
-    graph = Graph()
-    graph.change(list(operations))
-    return graph
-
-
 def test_a_window_has_the_values_of_its_cells_across_tiles() -> None:
-    graph = _graph(
-        _cells(PlaceColumn.ROAD, -1, TILE_SIDE, 0.5),
-        _cells(PlaceColumn.OBSTACLE, 2, TILE_SIDE - 1, 0.25),
+    graph = graph_of(
+        cells(PlaceColumn.ROAD, {(-1, TILE_SIDE): 0.5}),
+        cells(PlaceColumn.OBSTACLE, {(2, TILE_SIDE - 1): 0.25}),
     )
     extent = Extent((-3, TILE_SIDE - 2), (4, TILE_SIDE + 3))
     window = graph.places.window(ROOT_MAP, [PlaceColumn.ROAD, PlaceColumn.OBSTACLE], extent)
@@ -48,11 +33,11 @@ def test_a_window_has_the_values_of_its_cells_across_tiles() -> None:
 
 def test_a_window_without_an_extent_holds_all_tiles_of_its_map() -> None:
     fine = Map(id="map:fine", cell_m=0.5, parent=ROOT_MAP)
-    graph = _graph(
+    graph = graph_of(
         fine,
-        _cells(PlaceColumn.ROAD, -1, -1, 1.0),
-        _cells(PlaceColumn.ROAD, TILE_SIDE, 0, 1.0),
-        _cells(PlaceColumn.ROAD, 500, 500, 1.0, "map:fine"),
+        cells(PlaceColumn.ROAD, {(-1, -1): 1.0}),
+        cells(PlaceColumn.ROAD, {(TILE_SIDE, 0): 1.0}),
+        cells(PlaceColumn.ROAD, {(500, 500): 1.0}, "map:fine"),
     )
     window = graph.places.window(ROOT_MAP, [PlaceColumn.ROAD])
 
@@ -62,13 +47,13 @@ def test_a_window_without_an_extent_holds_all_tiles_of_its_map() -> None:
 
 
 def test_a_map_without_place_nodes_has_an_empty_window() -> None:
-    window = _graph().places.window(ROOT_MAP, WEIGHT_COLUMNS)
+    window = graph_of().places.window(ROOT_MAP, WEIGHT_COLUMNS)
 
     assert window.values.shape == (4, 0, 0)
 
 
 def test_links_that_were_never_seen_are_free_and_have_no_evidence() -> None:
-    graph = _graph(_cells(PlaceColumn.EVIDENCE_N, 0, 0, -2.0))
+    graph = graph_of(cells(PlaceColumn.EVIDENCE_N, {(0, 0): -2.0}))
     extent = Extent((0, 0), (TILE_SIDE, 2 * TILE_SIDE))
     window = graph.places.window(ROOT_MAP, [*EVIDENCE_COLUMNS, *WEIGHT_COLUMNS], extent)
 
@@ -78,17 +63,17 @@ def test_links_that_were_never_seen_are_free_and_have_no_evidence() -> None:
 
 
 def test_a_window_does_not_change_with_the_graph() -> None:
-    graph = _graph(_cells(PlaceColumn.ROAD, 0, 0, 0.5))
+    graph = graph_of(cells(PlaceColumn.ROAD, {(0, 0): 0.5}))
     window = graph.places.window(ROOT_MAP, [PlaceColumn.ROAD])
-    graph.change([_cells(PlaceColumn.ROAD, 0, 0, 1.0)])
+    graph.change([cells(PlaceColumn.ROAD, {(0, 0): 1.0})])
 
     assert window.column(PlaceColumn.ROAD)[0, 0] == 0.5
 
 
 def test_a_window_too_large_for_memory_is_refused() -> None:
-    graph = _graph(
-        _cells(PlaceColumn.ROAD, -FAR, -FAR, 1.0),
-        _cells(PlaceColumn.ROAD, FAR, FAR, 1.0),
+    graph = graph_of(
+        cells(PlaceColumn.ROAD, {(-FAR, -FAR): 1.0}),
+        cells(PlaceColumn.ROAD, {(FAR, FAR): 1.0}),
     )
     with pytest.raises(MessageError, match="ask for a part of the map"):
         graph.places.window(ROOT_MAP, [PlaceColumn.ROAD])

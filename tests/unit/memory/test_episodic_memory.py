@@ -25,7 +25,7 @@ from cogmap.schemas.nodes import (
     Remembered,
     need_id,
 )
-from tests.support.messages import of_type
+from cogmap.testing import of_type
 from tests.support.world.mind import (
     BINARY,
     EPISODIC,

@@ -30,8 +30,7 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.schemas.sensing import RangeScan
 from cogmap.services.memory.module import Config, build
-from tests.support.messages import of_type
-from tests.support.world.scenes import agent
+from cogmap.testing import agent, of_type
 
 CONFIG = Config(store_cycles=2, recall_cycles=1)
 LOOKS = ("bakery", "tower", "house", "school")

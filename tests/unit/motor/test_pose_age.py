@@ -16,9 +16,9 @@ from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.process import Clock
 from cogmap.schemas.sensing import MotorCommand, SpeedLimit
 from cogmap.services.motor.module import Config, build
+from cogmap.testing import agent
 from tests.support.world.motor import action_of
 from tests.support.world.plans import joined, plan_along
-from tests.support.world.scenes import agent
 
 TICK_S = 0.05
 CYCLE_TICKS = 8

@@ -5,6 +5,7 @@ from __future__ import annotations
 import msgspec
 
 from cogmap.schemas.cognition import ActionName, MotorProgram
+from cogmap.testing import agent
 from tests.support.world.motor import (
     action_of,
     commands_in,
@@ -14,7 +15,6 @@ from tests.support.world.motor import (
     pose_delta,
 )
 from tests.support.world.plans import joined, plan_along
-from tests.support.world.scenes import agent
 
 
 def test_a_restarted_motor_module_continues_along_its_route() -> None:

@@ -25,8 +25,8 @@ from cogmap.schemas.nodes import (
     episode_id,
 )
 from cogmap.services.procedural.module import Config, build
+from cogmap.testing import PERIOD_NS, agent
 from tests.support.world.guidance import broadcast, driven, relations, selected
-from tests.support.world.scenes import PERIOD_NS, agent
 from tests.support.world.schemes import FOLLOW, HEADER, written
 
 READY = Plan(id=PLAN_ID, state=PlanState.READY, base_level=1.0)

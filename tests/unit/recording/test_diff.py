@@ -18,8 +18,8 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta, DropNode, Link, Phase
 from cogmap.schemas.nodes import Node
 from cogmap.schemas.sensing import Odometry, RangeScan
-from tests.support.logs import odometry, scan, write_log
-from tests.support.messages import of_type
+from cogmap.testing import odometry, of_type
+from tests.support.logs import scan, write_log
 
 Change = Callable[[list[Message]], object]
 

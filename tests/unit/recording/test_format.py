@@ -20,8 +20,8 @@ from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.recover import recover
 from cogmap.recording.storage.writer import LogWriter
 from cogmap.schemas import topics
+from cogmap.testing import odometry
 from cogmap.version import VERSION
-from tests.support.logs import odometry
 from tests.support.mcap_doctor import Doctor
 
 

@@ -15,9 +15,9 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.examples import example_messages
 from cogmap.schemas.graph import Delta
 from cogmap.schemas.sensing import Odometry
+from cogmap.testing import odometry, of_type
 from cogmap.version import VERSION
-from tests.support.logs import SECOND_NS, odometry, write_log
-from tests.support.messages import of_type
+from tests.support.logs import SECOND_NS, write_log
 
 START_NS = 100 * SECOND_NS
 

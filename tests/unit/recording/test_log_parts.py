@@ -15,7 +15,8 @@ from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import LogWriter
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
-from tests.support.logs import ABOUT, SECOND_NS, odometry
+from cogmap.testing import odometry
+from tests.support.logs import ABOUT, SECOND_NS
 
 CHUNKS = 40
 IN_A_CHUNK = 5

@@ -16,7 +16,8 @@ from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.recover import recover
 from cogmap.recording.storage.writer import LogWriter
 from cogmap.schemas import topics
-from tests.support.logs import ABOUT, odometry
+from cogmap.testing import odometry
+from tests.support.logs import ABOUT
 
 COUNT = 200
 TOPICS = (topics.ODOMETRY, topics.ENERGY)

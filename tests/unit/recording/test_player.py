@@ -19,7 +19,8 @@ from cogmap.runtime.delivery.intake import Intake
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock, Presence
-from tests.support.logs import SECOND_NS, odometry
+from cogmap.testing import odometry
+from tests.support.logs import SECOND_NS
 
 MILLISECOND_NS = 10**6
 COUNT = 10

@@ -16,7 +16,8 @@ from cogmap.recording.selection import to_record
 from cogmap.recording.storage.reader import LogReader
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
-from tests.support.logs import odometry, scan
+from cogmap.testing import odometry
+from tests.support.logs import scan
 
 
 class Recorded:

@@ -20,7 +20,7 @@ from cogmap.recording.storage.recover import recover
 from cogmap.recording.storage.resync import LogBytes
 from cogmap.recording.storage.writer import LogWriter
 from cogmap.schemas import topics
-from tests.support.logs import odometry
+from cogmap.testing import odometry
 
 CHUNKS = 6
 EACH = 5

@@ -15,7 +15,7 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import Calibration, Odometry, RangeScan, SelfMotion, StereoFrame, View
 from cogmap.services.sensory.module import Config, build
-from tests.support.messages import of_type
+from cogmap.testing import of_type
 
 STEP_NS = 50_000_000
 CALIBRATION = Calibration(

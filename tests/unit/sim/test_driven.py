@@ -36,7 +36,7 @@ from cogmap.services.sim.percept_level.ground import MAX_RANGE_M
 from cogmap.services.sim.percept_level.percepts import PerceptErrors
 from cogmap.services.sim.percept_level.surroundings import Surroundings
 from cogmap.services.sim.percept_level.town_sensors import TownSensors, scan
-from tests.support.messages import of_type
+from cogmap.testing import of_type
 
 MOUNT = calibration()
 TOWN = generate(1)

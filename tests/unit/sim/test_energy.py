@@ -25,7 +25,7 @@ from cogmap.services.sim.battery import Battery, PowerSupply
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE
 from cogmap.services.sim.module import Config, build
 from cogmap.services.sim.trajectory import Trajectory
-from tests.support.messages import of_type
+from cogmap.testing import of_type
 
 HERE = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
 BATTERY = Battery(capacity_s=100.0, cost_per_m=0.01, charge_s=10.0, charge_within_m=5.0)

@@ -23,7 +23,7 @@ from cogmap.schemas.sensing import (
     TrueTown,
 )
 from cogmap.services.sim.module import Config, build
-from tests.support.messages import of_type
+from cogmap.testing import of_type
 
 M = TypeVar("M", bound=Message)
 TICK_NS = 50_000_000

@@ -11,7 +11,7 @@ from cogmap.schemas.sensing import MotorCommand, Percepts, TrueTown
 from cogmap.services.sim.layout.removals import Removal, RemovedBuildings
 from cogmap.services.sim.module import Config, build
 from cogmap.services.sim.percept_level.percepts import PerceptErrors
-from tests.support.messages import of_type
+from cogmap.testing import of_type
 
 
 def _config(**changes: object) -> Config:

@@ -17,7 +17,7 @@ from cogmap.services.sim.percept_level.percepts import PerceptErrors, PerceptSim
 from cogmap.services.sim.percept_level.places import PlaceSim
 from cogmap.services.sim.simulation import Simulation
 from cogmap.services.sim.trajectory import Landmark, Line, Trajectory
-from tests.support.messages import of_type
+from cogmap.testing import of_type
 
 SILENT = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
 EXACT = PerceptErrors(

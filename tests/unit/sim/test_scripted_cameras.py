@@ -30,8 +30,8 @@ from cogmap.services.sim.odometry import Noise
 from cogmap.services.sim.rendering.camera import StereoCamera
 from cogmap.services.sim.trajectory import Landmark, Trajectory
 from cogmap.services.sim.world import World
+from cogmap.testing import of_type
 from cogmap.training.rendering import towns
-from tests.support.messages import of_type
 
 SILENT = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
 BAKERY = Landmark(name="bakery", x_m=40.0, y_m=14.0)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from cogmap.schemas.cognition import Coalitions
 from cogmap.schemas.graph import Delta
-from tests.support.messages import of_type
-from tests.support.world.scenes import Desk, percept
+from cogmap.testing import of_type, percept
+from tests.support.world.scenes import Desk
 
 
 def test_coalitions_are_published_once_after_the_phase_with_an_id_each() -> None:

@@ -24,7 +24,8 @@ from cogmap.schemas.graph import (
 )
 from cogmap.schemas.nodes import ROOT_MAP, TILE_SIDE, LinkKind, Map, Node, PlaceColumn, object_id
 from cogmap.services.workspace.commit import Ledger
-from tests.support.world.scenes import Desk, agent, answer, landmark, percept, task, thing
+from cogmap.testing import agent, landmark, percept, task
+from tests.support.world.scenes import Desk, answer, thing
 
 WRITABLE = frozenset({Node, *PlaceColumn})
 

@@ -16,16 +16,8 @@ from cogmap.schemas.codelets import Leases, Task
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Delta, SnapshotRequest
 from cogmap.schemas.nodes import LinkKind, Self, object_id, percept_id
-from tests.support.world.scenes import (
-    Desk,
-    agent,
-    answer,
-    landmark,
-    motion,
-    percept,
-    percepts,
-    stamp_ns,
-)
+from cogmap.testing import agent, landmark, percept, percepts, self_motion, stamp_ns
+from tests.support.world.scenes import Desk, answer
 
 
 def _moved_self(frame: int, x_m: float = 1.0) -> Self:
@@ -46,9 +38,9 @@ def _localized(desk: Desk) -> list[Task]:
 def test_percepts_wait_for_the_self_motion_up_to_them() -> None:
     desk = Desk("w1")
     assert desk.feed(percepts(1)) == []
-    assert desk.feed(motion(0)) == []
+    assert desk.feed(self_motion(0)) == []
 
-    published = desk.feed(motion(1))
+    published = desk.feed(self_motion(1))
     assert [type(message) for message in published] == [Delta, Leases, Task]
 
 
@@ -56,7 +48,7 @@ def test_self_motion_alone_begins_no_cycle() -> None:
     desk = Desk("w1")
 
     for frame in range(3):
-        assert desk.feed(motion(frame)) == []
+        assert desk.feed(self_motion(frame)) == []
 
 
 def test_a_cycle_commits_percepts_the_pose_objects_what_attention_keeps_and_an_end() -> None:
@@ -237,11 +229,11 @@ def test_self_motion_of_a_wrong_shape_is_refused_and_changes_nothing(
     desk = Desk("w1")
     desk.feed(percepts(0))
     rows = Array.of(np.zeros(shape))
-    bad = msgspec.structs.replace(motion(0), motions=rows)
+    bad = msgspec.structs.replace(self_motion(0), motions=rows)
 
     with pytest.raises(MessageError, match="self-motion of shape"):
         desk.feed(bad)
-    assert desk.feed(motion(0))
+    assert desk.feed(self_motion(0))
 
 
 def test_ground_points_of_a_wrong_shape_are_refused() -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from cogmap.schemas.nodes import Object, object_id
-from tests.support.world.scenes import Desk, percept
+from cogmap.testing import percept
+from tests.support.world.scenes import Desk
 
 
 def _desk() -> Desk:

@@ -5,18 +5,16 @@ from __future__ import annotations
 from typing import get_args
 
 import msgspec
-import numpy as np
 import pytest
 
 from cogmap.graph import decay
 from cogmap.graph.graph import Graph
 from cogmap.graph.places import Place
-from cogmap.schemas.array import Array
-from cogmap.schemas.graph import Cells, Decay, Delta, DropNode, Link, Phase
+from cogmap.schemas.graph import Decay, Delta, DropNode, Link, Phase
 from cogmap.schemas.nodes import KINDS, AnyNode, Node, PlaceColumn, coarse_map_id
 from cogmap.services.workspace.forgetting import Forgetting
-from tests.support.messages import of_type
-from tests.support.world.scenes import Desk, agent, percept
+from cogmap.testing import agent, cells, of_type, percept
+from tests.support.world.scenes import Desk
 
 RATES = Decay(activation=0.1, base_level=0.0005, place_activation=0.02, forget_below=0.05)
 HERE = (-3, 70)
@@ -71,13 +69,6 @@ def test_activation_never_falls_below_zero() -> None:
     run.end_cycles(3)
 
     assert run.graph.activation(run.graph.nodes["a"]) == 0.0
-
-
-def _cells(column: PlaceColumn, value: float) -> Cells:
-    """A value of the place node HERE."""
-    where = Array.of(np.array([HERE], np.int32))
-    values = Array.of(np.full(1, value, np.float32))
-    return Cells(column=column, cells=where, values=values)
 
 
 def test_persistent_kinds_do_not_decay() -> None:
@@ -161,7 +152,7 @@ def _place(graph: Graph) -> Place:
 
 
 def test_the_activation_of_place_nodes_decays_to_zero() -> None:
-    run = _Run(_cells(PlaceColumn.ACTIVATION, 0.05))
+    run = _Run(cells(PlaceColumn.ACTIVATION, {HERE: 0.05}))
     trace = []
     for _ in range(4):
         trace.append(_place(run.graph).activation)
@@ -171,7 +162,7 @@ def test_the_activation_of_place_nodes_decays_to_zero() -> None:
 
 
 def test_road_does_not_decay() -> None:
-    run = _Run(_cells(PlaceColumn.ROAD, 1.0))
+    run = _Run(cells(PlaceColumn.ROAD, {HERE: 1.0}))
     run.end_cycles(10)
 
     assert _place(run.graph).road == 1.0

@@ -13,15 +13,8 @@ from cogmap.schemas.nodes import NEVER_NS, Misfits, Object, object_id, percept_i
 from cogmap.schemas.nodes import Percept as PerceptNode
 from cogmap.schemas.sensing import Percept
 from cogmap.services.workspace.individuals import individuals
-from tests.support.world.scenes import (
-    Desk,
-    agent,
-    graph_of,
-    landmark,
-    percept,
-    percepts,
-    stamp_ns,
-)
+from cogmap.testing import agent, graph_of, landmark, percept, percepts, stamp_ns
+from tests.support.world.scenes import Desk
 
 STILL = Array.of(np.zeros((0, 5)))
 NORTH_RAD = math.pi / 2

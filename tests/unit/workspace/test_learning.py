@@ -18,7 +18,8 @@ from cogmap.schemas.nodes import (
     object_id,
 )
 from cogmap.services.workspace.learning.base_level import learned_operations
-from tests.support.world.scenes import Desk, agent, graph_of, landmark, motion, percept, percepts
+from cogmap.testing import agent, graph_of, landmark, percept, percepts, self_motion
+from tests.support.world.scenes import Desk
 
 CONSCIOUS = Run(lockstep=True, participants={"global_workspace": 1})
 
@@ -176,7 +177,7 @@ def test_a_view_that_is_repeated_begins_its_cycle_without_a_competition_that_was
     desk.see(1)
     assert _begun(desk) == [1]
 
-    desk.feed(motion(1))
+    desk.feed(self_motion(1))
     desk.feed(percepts(1))
     assert _begun(desk) == [1, 2]
 

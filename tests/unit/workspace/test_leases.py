@@ -12,18 +12,17 @@ from cogmap.schemas.nodes import Self
 from cogmap.schemas.process import Presence
 from cogmap.services.codelets.sub_maps.coarse_places import EVERY_CYCLES
 from cogmap.services.workspace.dispatch import MAX_ATTEMPTS
-from tests.support.messages import of_type
-from tests.support.world.scenes import (
+from cogmap.testing import (
     PERIOD_NS,
-    Desk,
     agent,
-    answer,
     landmark,
-    motion,
+    of_type,
     percept,
     percepts,
+    self_motion,
     stamp_ns,
 )
+from tests.support.world.scenes import Desk, answer
 
 MS = 1_000_000
 
@@ -218,7 +217,7 @@ def test_a_cycle_commits_the_answers_at_its_deadline_and_the_next_begins() -> No
     desk.clock(_after(0, 180))
     assert desk.deltas[-1].phase == "localization"
 
-    desk.feed(motion(1))
+    desk.feed(self_motion(1))
     desk.feed(percepts(1))
     desk.clock(_after(0, 181))
     phases = [delta.phase for delta in desk.deltas]

@@ -15,8 +15,8 @@ from cogmap.schemas.nodes import (
     object_id,
     place_id,
 )
-from tests.support.messages import of_type
-from tests.support.world.scenes import Desk, agent, percept, thing
+from cogmap.testing import agent, of_type, percept
+from tests.support.world.scenes import Desk, thing
 
 OFFERED = Run(lockstep=True, participants={"memory": 1})
 

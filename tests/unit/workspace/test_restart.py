@@ -11,8 +11,8 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import Node
-from tests.support.messages import of_type
-from tests.support.world.scenes import Desk, percept, thing
+from cogmap.testing import of_type, percept
+from tests.support.world.scenes import Desk, thing
 
 OFFERED = Run(lockstep=True, participants={"memory": 1})
 

@@ -14,7 +14,8 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.sensing import RangeScan
 from cogmap.services.workspace.senses import MAX_SCAN_AGE_NS
-from tests.support.world.scenes import Desk, motion, percepts, stamp_ns
+from cogmap.testing import percepts, self_motion, stamp_ns
+from tests.support.world.scenes import Desk
 
 RAYS = ((0.1, 5.0), (0.0, 0.0))
 SCANNED = Run(lockstep=True, participants={"sim": 1})
@@ -92,7 +93,7 @@ def test_a_scan_that_is_published_again_changes_nothing(stepped: Desk) -> None:
     version = stepped.deltas[-1].version
 
     assert stepped.feed(_scan(0)) == []
-    stepped.feed(motion(0))
+    stepped.feed(self_motion(0))
     stepped.feed(percepts(0))
     assert stepped.deltas[-1].version == version
 

@@ -12,7 +12,7 @@ from cogmap.schemas.array import Matrix
 from cogmap.schemas.graph import Delta, Operation, Phase
 from cogmap.schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Recollection
 from cogmap.schemas.sensing import Pose, TruePose
-from tests.support.world.scenes import agent
+from cogmap.testing import agent
 
 START = Pose(x_m=10.0, y_m=20.0, heading_rad=math.pi / 2)
 

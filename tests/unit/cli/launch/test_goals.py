@@ -5,7 +5,7 @@ from __future__ import annotations
 from cogmap.cli.launch.goals import unreached
 from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import PLAN_ID, Goal, Object, Plan, PlanState, goal_id, object_id
-from tests.support.world.scenes import graph_of
+from cogmap.testing import graph_of
 
 KNOWN = ("bakery", "school")
 

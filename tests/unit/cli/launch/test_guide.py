@@ -13,7 +13,7 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.nodes import PLAN_ID, Goal, Object, Plan, PlanState, object_id
 from cogmap.schemas.sensing import Pose, Street, StreetClosure, TruePose, TrueTown
-from tests.support.world.scenes import agent
+from cogmap.testing import agent
 
 CORNERS = ((0.0, 0.0), (60.0, 0.0), (60.0, 40.0), (0.0, 40.0))
 NAMES = ("south", "east", "north", "west")

@@ -16,8 +16,10 @@ from cogmap.schemas.cognition import Competition
 from cogmap.schemas.graph import Delta, DropNode, Operation, Phase
 from cogmap.schemas.nodes import Goal
 from cogmap.schemas.sensing import Odometry, Pose, SelfMotion, TruePose
+from cogmap.testing import agent
+from cogmap.testing import odometry as wheels
 from tests.support.world.plans import plan_along
-from tests.support.world.scenes import agent, thing
+from tests.support.world.scenes import thing
 
 TICK_NS = 50_000_000
 TICK_S = 0.05
@@ -29,9 +31,7 @@ def true_pose(tick: int, x_m: float, y_m: float, heading_rad: float = 0.0) -> Tr
 
 
 def odometry(tick: int, speed_m_s: float, turn_rate_rad_s: float = 0.0) -> Odometry:
-    return Odometry(
-        stamp_ns=tick * TICK_NS, speed_m_s=speed_m_s, turn_rate_rad_s=turn_rate_rad_s, dt_s=TICK_S
-    )
+    return wheels(0, speed_m_s, turn_rate_rad_s, stamp_ns=tick * TICK_NS, dt_s=TICK_S)
 
 
 def estimate(tick: int, x_m: float, y_m: float, version: int = 1) -> Delta:

@@ -31,7 +31,7 @@ from cogmap.schemas.sensing import (
     TruePose,
 )
 from cogmap.services.sim.layout.town import generate
-from tests.support.world.scenes import agent, landmark
+from cogmap.testing import agent, landmark
 
 MS = 1_000_000
 

@@ -10,7 +10,8 @@ import pytest
 from cogmap.errors import UsageError
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import Odometry, Pose, TruePose
-from tests.support.logs import SECOND_NS, odometry, write_log
+from cogmap.testing import odometry
+from tests.support.logs import SECOND_NS, write_log
 from tests.support.system.commands import log_command, log_facts
 
 STEPS = 5

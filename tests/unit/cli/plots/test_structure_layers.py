@@ -10,7 +10,7 @@ from cogmap.cli.plots.map_structure import draw_structure
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Cells, Links
 from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, PlaceColumn, map_id
-from tests.support.world.scenes import graph_of, landmark
+from cogmap.testing import graph_of, landmark
 
 
 def test_the_road_on_the_grid_of_a_sub_map_is_drawn_where_it_is_on_the_root_map() -> None:

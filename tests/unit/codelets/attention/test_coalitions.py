@@ -20,7 +20,8 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.services.codelets.attention.coalitions import coalition
 from cogmap.services.codelets.attention.novelty import Config
-from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
+from cogmap.testing import agent, graph_of, landmark, percept, task
+from tests.support.world.scenes import run
 
 CONFIG = Config()
 NOVEL_SIGHTINGS = CONFIG.novel_sightings

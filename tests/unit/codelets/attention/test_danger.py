@@ -14,7 +14,8 @@ from cogmap.schemas.graph import Delta, Operation, Phase
 from cogmap.schemas.nodes import Attention, attention_id
 from cogmap.schemas.sensing import Percept, RangeScan
 from cogmap.services.codelets.attention import danger
-from tests.support.world.scenes import agent, graph_of, landmark, percept, percepts, run
+from cogmap.testing import agent, graph_of, landmark, percept, percepts
+from tests.support.world.scenes import run
 
 CONFIG = NoSettings()
 BEARINGS_RAD = np.linspace(-0.6, 0.6, 13)

@@ -11,7 +11,8 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Decay, Delta, Phase
 from cogmap.schemas.nodes import Episode, Remembered, episode_id
 from cogmap.services.codelets.attention import episode
-from tests.support.world.scenes import agent, graph_of, percepts, run, task
+from cogmap.testing import agent, graph_of, percepts, task
+from tests.support.world.scenes import run
 
 CONFIG = NoSettings()
 BAKERY = Remembered(kind="object", label="bakery")

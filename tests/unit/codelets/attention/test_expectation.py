@@ -30,7 +30,8 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.services.codelets.attention.disappearance import MAX_OBJECTS
 from cogmap.services.codelets.attention.expectation import Config
-from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
+from cogmap.testing import agent, graph_of, landmark, percept, task
+from tests.support.world.scenes import run
 
 VIEWS = 3
 """So many in which rays pass where a house stood are a surprise; twice as many without."""

@@ -23,7 +23,8 @@ from cogmap.schemas.nodes import (
     goal_id,
 )
 from cogmap.services.codelets.attention import goal
-from tests.support.world.scenes import agent, graph_of, percepts, run
+from cogmap.testing import agent, graph_of, percepts
+from tests.support.world.scenes import run
 
 CONFIG = NoSettings()
 INN = goal_id("inn")

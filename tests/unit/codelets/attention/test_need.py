@@ -17,7 +17,8 @@ from cogmap.schemas.nodes import (
     object_id,
 )
 from cogmap.services.codelets.attention.need import Config
-from tests.support.world.scenes import agent, graph_of, run, task
+from cogmap.testing import agent, graph_of, task
+from tests.support.world.scenes import run
 
 CONFIG = Config()
 

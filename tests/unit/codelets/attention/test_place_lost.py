@@ -12,7 +12,8 @@ from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Delta, Operation, Phase
 from cogmap.schemas.nodes import Attention, Misfits, attention_id
 from cogmap.services.codelets.attention import place_lost
-from tests.support.world.scenes import agent, graph_of, landmark, percepts, run, task
+from cogmap.testing import agent, graph_of, landmark, percepts, task
+from tests.support.world.scenes import run
 
 CONFIG = NoSettings()
 MEMORY = attention_id("place_lost")

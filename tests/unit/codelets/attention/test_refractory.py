@@ -13,7 +13,8 @@ from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.nodes import Attention, Need, attention_id, need_id
 from cogmap.services.codelets.attention import need
 from cogmap.services.codelets.attention.pending import is_refractory, without_conscious
-from tests.support.world.scenes import agent, graph_of, landmark, percept, percepts, run, task
+from cogmap.testing import agent, graph_of, landmark, percept, percepts, task
+from tests.support.world.scenes import run
 
 NOTHING = NoSettings()
 NO_MOTION = Array.of(np.zeros((0, 5)))

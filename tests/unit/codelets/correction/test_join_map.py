@@ -33,7 +33,8 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.correction import join_map
-from tests.support.world.scenes import agent, graph_of, landmark, percepts, run, task
+from cogmap.testing import agent, graph_of, landmark, percepts, task
+from tests.support.world.scenes import run
 
 QUARTER_RAD = math.pi / 2
 CONFIG = Config()

@@ -26,9 +26,10 @@ from cogmap.schemas.nodes import (
     object_id,
 )
 from cogmap.services.codelets.mapping.path import ODOMETRY, POSE, STAMP
+from cogmap.testing import stamp_ns
 from tests.support.paths import mean_distance_m, steps_m
 from tests.support.world.loop_drive import HOUSE, LAP, QUIET, SLIP, TOWER, LoopDrive, round_once
-from tests.support.world.scenes import Desk, stamp_ns
+from tests.support.world.scenes import Desk
 
 
 def _closures(desk: Desk) -> list[LoopClosure]:

@@ -19,7 +19,8 @@ from cogmap.services.codelets.cells import MAX_CELLS
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.correction.place_columns import move_places
 from cogmap.services.codelets.mapping.evidence import weights_of
-from tests.support.world.scenes import graph_of, run, task
+from cogmap.testing import graph_of, task
+from tests.support.world.scenes import run
 
 CUT = -3.0
 FREE = 2.0

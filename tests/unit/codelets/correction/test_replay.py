@@ -10,9 +10,8 @@ from cogmap.geometry.arrays import Floats
 from cogmap.schemas.cognition import Replay
 from cogmap.schemas.graph import Delta, Phase
 from cogmap.services.codelets.correction.joint import ROUNDS
-from tests.support.messages import of_type
+from cogmap.testing import of_type, stamp_ns
 from tests.support.world.loop_drive import QUIET, LoopDrive, round_once
-from tests.support.world.scenes import stamp_ns
 
 
 def _replay(drive: LoopDrive) -> Replay:

@@ -38,7 +38,8 @@ from cogmap.services.codelets.mapping.path import (
     links_of,
     steps_of,
 )
-from tests.support.world.scenes import graph_of, run, task
+from cogmap.testing import graph_of, task
+from tests.support.world.scenes import run
 
 CONFIG = Config(sparse_after_s=50.0, revisit_s=20.0)
 NO_POINTS = Array.of(np.zeros((0, 2), np.float32))

@@ -13,7 +13,7 @@ from cogmap.schemas.nodes import LoopClosure, PathColumn, PathSegment, segment_i
 from cogmap.schemas.sensing import Percepts
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.correction.map_correction import CODELET
-from tests.support.world.scenes import graph_of
+from cogmap.testing import graph_of
 
 CONFIG = Config(closure_spacing_s=2.0, revisit_s=100.0)
 A_SECOND_NS = 1_000_000_000

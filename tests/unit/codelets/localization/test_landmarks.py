@@ -10,8 +10,9 @@ import pytest
 from cogmap.schemas.nodes import Object
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.localization.landmarks import MISSES
+from cogmap.testing import agent, graph_of, landmark, percept, task
 from tests.support.world.landmarks import house
-from tests.support.world.scenes import agent, graph_of, landmark, percept, run, task
+from tests.support.world.scenes import run
 
 CONFIG = Config(correlated_views=1.0)
 ASIDE_RAD = math.pi / 2

@@ -13,6 +13,7 @@ from cogmap.graph.graph import Graph
 from cogmap.schemas.graph import Link
 from cogmap.schemas.nodes import LinkKind, Self
 from cogmap.services.codelets.config import Config
+from cogmap.testing import agent, graph_of, percept, task
 from tests.support.world.landmarks import (
     house,
     localized,
@@ -21,7 +22,7 @@ from tests.support.world.landmarks import (
     pose_of,
     samples_of,
 )
-from tests.support.world.scenes import agent, graph_of, percept, run, task
+from tests.support.world.scenes import run
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from cogmap.services.codelets.localization.measurement_model import (
     measurements,
 )
 from cogmap.services.codelets.mapping.path import segments
-from tests.support.world.scenes import graph_of, landmark, percept
+from cogmap.testing import graph_of, landmark, percept
 
 RANGE_M = 10.0
 AGENT_SD_M = 0.5

@@ -15,9 +15,10 @@ from cogmap.schemas.nodes import Object, PathIntegration, Self
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.localization.misfits import MISFITS_TO_RELOCALIZE
-from tests.support.world.scenes import agent as self_node
-from tests.support.world.scenes import graph_of, percept, run, task
-from tests.support.world.scenes import landmark as object_node
+from cogmap.testing import agent as self_node
+from cogmap.testing import graph_of, percept, task
+from cogmap.testing import landmark as object_node
+from tests.support.world.scenes import run
 
 PLACES = {"mill": (20.0, 0.0), "tower": (0.0, 25.0), "church": (-15.0, -10.0), "inn": (30.0, 30.0)}
 Pose = tuple[float, float, float]

@@ -10,7 +10,8 @@ import pytest
 from cogmap.schemas.graph import Link
 from cogmap.schemas.nodes import Object, object_id
 from cogmap.services.codelets.config import Config
-from tests.support.world.scenes import Desk, agent, graph_of, percept, run, task
+from cogmap.testing import agent, graph_of, percept, task
+from tests.support.world.scenes import Desk, run
 
 CONFIG = Config(landmark_samples=40)
 

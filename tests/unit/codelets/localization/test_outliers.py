@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cogmap.services.codelets.config import Config
+from cogmap.testing import agent, percept
 from tests.support.world.landmarks import (
     house,
     localized,
@@ -16,7 +17,6 @@ from tests.support.world.landmarks import (
     pose_of,
     samples_of,
 )
-from tests.support.world.scenes import agent, percept
 
 FIVE_METRES = (5.0, 0.0, 1.0, 0.5, 0.0)
 

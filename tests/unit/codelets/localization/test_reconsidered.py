@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from benchmarks.localization.loop import LocalizationLoop
-from benchmarks.localization.senses import TICK_S, Moment, seen
+from benchmarks.localization.senses import TICK_S, Moment
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import compose, relative, transform_to
+from cogmap.geometry.se2 import compose, relative
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.localization.measurement_model import cost_of_mistake
+from cogmap.testing import percept_at
 
 LANDMARKS = {
     "a": (10.0, 4.0),
@@ -40,9 +41,7 @@ def _turned_about_a() -> Floats:
 
 def _percept(label: str, pose: Floats, stands_at: str = "") -> Percept:
     """A landmark seen from a pose, or what stands at another one taken for it."""
-    where_m = np.array(LANDMARKS[stands_at or label])
-    ahead_m, left_m = transform_to(pose, where_m).tolist()
-    return seen(label, math.atan2(left_m, ahead_m), math.hypot(left_m, ahead_m))
+    return percept_at(pose, label, LANDMARKS[stands_at or label])
 
 
 def _poses(start: Floats, number: int) -> list[Floats]:

@@ -20,7 +20,8 @@ from cogmap.schemas.nodes import ROOT_MAP, Map, Misfits, PlaceColumn
 from cogmap.schemas.sensing import RangeScan
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.mapping import boundary
-from tests.support.world.scenes import graph_of, percepts, run
+from cogmap.testing import graph_of, percepts
+from tests.support.world.scenes import run
 from tests.support.world.street import Street, View, see, self_at
 
 CONFIG = Config()

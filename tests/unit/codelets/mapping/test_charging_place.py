@@ -5,8 +5,8 @@ from __future__ import annotations
 from cogmap.schemas.graph import Link
 from cogmap.schemas.nodes import Need, Object, need_id, object_id
 from cogmap.services.codelets.config import Config
-from tests.support.messages import of_type
-from tests.support.world.scenes import agent, graph_of, run, task
+from cogmap.testing import agent, graph_of, of_type, task
+from tests.support.world.scenes import run
 
 CONFIG = Config()
 POST = object_id("charging-place")

@@ -14,8 +14,9 @@ from cogmap.schemas.nodes import Observations, PathSegment
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.correction.joint import with_landmarks
 from cogmap.services.codelets.mapping.observations import Sightings, Viewpoint, extended
+from cogmap.testing import percept
 from tests.support.paths import mean_distance_m
-from tests.support.world.scenes import Desk, percept
+from tests.support.world.scenes import Desk
 
 STILL = np.zeros(3)
 TOWER_M = np.array([6.0, 8.0])

@@ -13,7 +13,8 @@ from cogmap.schemas.graph import Cells
 from cogmap.schemas.nodes import ROOT_MAP, Misfits, PlaceColumn
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.mapping.road_place import ROAD_REACH_M
-from tests.support.world.scenes import graph_of, run, task
+from cogmap.testing import graph_of, task
+from tests.support.world.scenes import run
 from tests.support.world.street import View, see, self_at
 
 CONFIG = Config()

@@ -13,8 +13,8 @@ from cogmap.schemas.nodes import (
     PlanState,
     segment_id,
 )
+from cogmap.testing import agent
 from tests.support.world.route_planning import goal_at, planned
-from tests.support.world.scenes import agent
 from tests.support.world.street_loop import barrier, block_of, loop
 
 

@@ -27,7 +27,7 @@ from cogmap.services.codelets.planning.sub_map_routes import sub_map_routes
 from cogmap.services.codelets.planning.targets import goals_m
 from cogmap.services.codelets.sub_maps import coarse_places, sub_map_places
 from cogmap.services.codelets.sub_maps.sub_map_grid import SETTLED_CYCLES
-from tests.support.world.scenes import agent, graph_of, task
+from cogmap.testing import agent, graph_of, task
 
 SIDE = 240
 EVERY = 40

@@ -11,7 +11,7 @@ from cogmap.schemas.array import Matrix
 from cogmap.schemas.nodes import ROOT_MAP, Map, PathColumn, PathSegment, PlaceColumn, segment_id
 from cogmap.services.codelets.planning.config import Config
 from cogmap.services.codelets.planning.place_cost import PlaceCosts, place_costs
-from tests.support.world.scenes import agent
+from cogmap.testing import agent
 from tests.support.world.street_loop import block_of
 
 LENGTH_M = 20

@@ -12,7 +12,7 @@ from cogmap.graph.window import Window
 from cogmap.schemas.nodes import PathColumn
 from cogmap.services.codelets.planning.ground import COLUMNS, LOOK_M, Ground
 from cogmap.services.codelets.planning.network import PlaceGrid
-from tests.support.world.scenes import agent
+from cogmap.testing import agent
 
 NOW_S = 1000.0
 HERE = PlaceGrid((-10, -10), (60, 21), 1.0)

@@ -26,7 +26,7 @@ from cogmap.schemas.nodes import (
 from cogmap.services.codelets.planning.config import Config
 from cogmap.services.codelets.planning.place_cost import place_costs
 from cogmap.services.codelets.planning.route_plan import run
-from tests.support.world.scenes import agent
+from cogmap.testing import agent
 from tests.support.world.street_loop import block_of
 
 NOW_S = 1000.0

@@ -26,8 +26,8 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.services.codelets.planning.config import Config
 from cogmap.services.codelets.planning.route_plan import due
+from cogmap.testing import agent, percepts
 from tests.support.world.route_planning import STAMP_NS, answered, goal_at, planned
-from tests.support.world.scenes import agent, percepts
 from tests.support.world.street_loop import barrier, block_of, cells_of, loop
 
 

@@ -11,7 +11,7 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Cells, Operation
 from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn, coarse_map_id
 from cogmap.services.codelets.sub_maps.coarse_places import EVERY_CYCLES, run
-from tests.support.world.scenes import agent, graph_of, task
+from cogmap.testing import agent, graph_of, task
 
 CONFIG = NoSettings()
 FINER, COARSEST = coarse_map_id(1), coarse_map_id(2)

@@ -11,7 +11,8 @@ from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, Object, PlaceColumn, m
 from cogmap.services.codelets.config import Config as WorkerConfig
 from cogmap.services.codelets.sub_maps.config import Config
 from cogmap.services.codelets.sub_maps.map_structure import ALL_ANEW_FROM, due
-from tests.support.world.scenes import graph_of, landmark, percept, percepts, run, task
+from cogmap.testing import graph_of, landmark, percept, percepts, task
+from tests.support.world.scenes import run
 
 CONFIG = Config()
 SPACING_M = 12.0

@@ -16,7 +16,7 @@ from cogmap.schemas.nodes import ROOT_MAP, Map, PlaceColumn, map_id
 from cogmap.services.codelets.sub_maps.resampling import COLUMNS
 from cogmap.services.codelets.sub_maps.sub_map_grid import BLOCK, SETTLED_CYCLES
 from cogmap.services.codelets.sub_maps.sub_map_places import EVERY_CYCLES, due, make_all, run
-from tests.support.world.scenes import agent, graph_of, percepts, task
+from cogmap.testing import agent, graph_of, percepts, task
 
 CONFIG = NoSettings()
 SETTLED = 1000

@@ -11,8 +11,8 @@ from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.memory import Stored, StoredObjects
 from cogmap.schemas.nodes import ROOT_MAP, AnyNode, Object, object_id
 from cogmap.services.memory.module import Config, build
-from tests.support.messages import of_type
-from tests.support.world.scenes import Desk, percept, received
+from cogmap.testing import of_type, percept
+from tests.support.world.scenes import Desk, received
 
 INN = object_id("inn")
 TOWN_M = {"inn": (30.0, 6.0), "mill": (32.0, -7.0)}

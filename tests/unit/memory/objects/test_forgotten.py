@@ -34,8 +34,7 @@ from cogmap.schemas.nodes import (
     segment_id,
 )
 from cogmap.services.memory.module import Config, build
-from tests.support.messages import of_type
-from tests.support.world.scenes import agent
+from cogmap.testing import agent, of_type
 
 CONFIG = Config(store_cycles=1, recall_cycles=1)
 RATES = Decay(activation=0.1, base_level=0.0005, forget_below=0.05, kept_base_level=0.9)

@@ -8,8 +8,8 @@ from cogmap.schemas.cognition import ActionName, Behaviour, GuidanceScheme
 from cogmap.schemas.nodes import PLAN_ID, Plan, PlanState
 from cogmap.services.procedural.guidance.guidance_memory import GuidanceMemory
 from cogmap.services.procedural.patterns import Active
+from cogmap.testing import PERIOD_NS
 from tests.support.world.guidance import broadcast, driven, guidance, relations, selected
-from tests.support.world.scenes import PERIOD_NS
 from tests.support.world.schemes import active
 
 NO_GOAL = Plan(id=PLAN_ID, state=PlanState.NO_GOAL, base_level=1.0)

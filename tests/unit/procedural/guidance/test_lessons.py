@@ -6,8 +6,8 @@ import pytest
 
 from cogmap.schemas.cognition import Relation
 from cogmap.services.procedural.guidance.lessons import STOP_NS, Lesson, Lessons
+from cogmap.testing import PERIOD_NS
 from tests.support.world.guidance import driven, relations
-from tests.support.world.scenes import PERIOD_NS
 
 STOP_CYCLES = STOP_NS // PERIOD_NS
 
