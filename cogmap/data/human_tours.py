@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 from collections import defaultdict
-from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -59,29 +59,23 @@ def read_folder(folder: Path) -> list[HumanTours]:
         if graph not in by_number:
             raise line.wrong(f"a graph of the folder: {', '.join(by_number)}")
 
-        tour = _tour(row, by_number[graph])
-        if tour is None:
+        problem = by_number[graph]
+        nodes_at: dict[tuple[float, float], list[int]] = defaultdict(list)
+        for node, (x, y) in enumerate(problem.positions.tolist()):
+            nodes_at[x, y].append(node)
+
+        # Of nodes at one place, which one was meant makes no difference.
+        visited: list[int] = []
+        with suppress(KeyError, ValueError, IndexError):
+            x_values = map(float, row["x"].split(","))
+            y_values = map(float, row["y"].split(","))
+            visited = [nodes_at[place].pop(0) for place in zip(x_values, y_values, strict=True)]
+        if len(visited) != len(problem):
             raise line.wrong(f"a tour past every node of graph {graph}, once")
-        tours[graph].append(tour)
+        tours[graph].append(np.array(visited, np.int64))
 
     return [HumanTours(by_number[number], tours[number]) for number in by_number if tours[number]]
 
 
 def _values(line: Line) -> list[str]:
     return next(csv.reader([line.text]), [])
-
-
-def _tour(row: Mapping[str, str], problem: Problem) -> Indices | None:
-    """Return the nodes in the order of a row; None if it does not visit each once."""
-    nodes_at: dict[tuple[float, float], list[int]] = defaultdict(list)
-    for node, (x, y) in enumerate(problem.positions.tolist()):
-        nodes_at[x, y].append(node)
-
-    try:
-        x_values = map(float, row["x"].split(","))
-        y_values = map(float, row["y"].split(","))
-        # Of nodes at one place, which one was meant makes no difference.
-        visited = [nodes_at[place].pop(0) for place in zip(x_values, y_values, strict=True)]
-    except (KeyError, ValueError, IndexError):
-        return None
-    return np.array(visited, np.int64) if len(visited) == len(problem) else None

@@ -8,7 +8,6 @@ corner is cut.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -42,7 +41,24 @@ def read_map(path: Path) -> Booleans:
     Raises UsageError naming file, line and remedy.
     """
     lines = numbered_lines(path, _MAP)
-    width, height = _size(path, lines)
+    sizes: dict[str, int] = {}
+    for line in lines:
+        words = line.text.split()
+        if words == ["map"]:
+            break
+
+        key, value = words if len(words) == 2 else ("", "")
+        if key in ("width", "height") and value.isdecimal():
+            sizes[key] = int(value)
+        elif words != ["type", "octile"]:
+            raise line.wrong(HEADER.get(key, f"{', '.join(HEADER.values())}, or map"))
+
+    if len(sizes) < 2:
+        raise UsageError(f"{path} has no height or no width before its map: give {_MAP}")
+    width, height = sizes["width"], sizes["height"]
+    if not 0 < width * height <= MAX_CELLS:
+        raise UsageError(f"{path} has {width} x {height} cells: give a map of 1 to {MAX_CELLS}")
+
     is_passable = np.zeros((width, height), bool)
     rows = 0
 
@@ -63,28 +79,6 @@ def read_map(path: Path) -> Booleans:
     return is_passable
 
 
-def _size(path: Path, lines: Iterator[Line]) -> tuple[int, int]:
-    """Read the header of a map, up to the line `map`, for its width and height."""
-    sizes: dict[str, int] = {}
-    for line in lines:
-        words = line.text.split()
-        if words == ["map"]:
-            break
-
-        key, value = words if len(words) == 2 else ("", "")
-        if key in ("width", "height") and value.isdecimal():
-            sizes[key] = int(value)
-        elif words != ["type", "octile"]:
-            raise line.wrong(HEADER.get(key, f"{', '.join(HEADER.values())}, or map"))
-
-    if len(sizes) < 2:
-        raise UsageError(f"{path} has no height or no width before its map: give {_MAP}")
-    width, height = sizes["width"], sizes["height"]
-    if not 0 < width * height <= MAX_CELLS:
-        raise UsageError(f"{path} has {width} x {height} cells: give a map of 1 to {MAX_CELLS}")
-    return width, height
-
-
 def read_problems(path: Path, is_passable: Booleans) -> list[Problem]:
     """Read the problems in a file, for the map `is_passable` (width, height).
 
@@ -95,34 +89,35 @@ def read_problems(path: Path, is_passable: Booleans) -> list[Problem]:
     if first.text.split() not in VERSIONS:
         raise first.wrong("version 1", f"give {_SCENARIO}")
 
-    problems = [_problem(line, is_passable) for line in lines if line.text.strip()]
+    map_width, map_height = is_passable.shape
+    problems = []
+    for line in lines:
+        if not line.text.strip():
+            continue
+
+        # The second field is a map's name, which may have spaces.
+        fields = line.text.rsplit(maxsplit=_FIELDS - 2)
+        try:
+            width, height, start_x, start_y, goal_x, goal_y = map(int, fields[1:-1])
+            optimal = float(fields[-1])
+        except (ValueError, IndexError):
+            expected = "bucket, map, width, height, start x y, goal x y and the optimal length"
+            raise line.wrong(expected) from None
+
+        if (width, height) != (map_width, map_height):
+            expected = f"a problem for a map of {map_width} x {map_height} cells"
+            raise line.wrong(expected, "give the map of these problems")
+        if not math.isfinite(optimal) or optimal < 0:
+            raise line.wrong("an optimal length that is finite and not below 0")
+
+        problem = Problem((start_x, start_y), (goal_x, goal_y), optimal)
+        for x, y in (problem.start, problem.goal):
+            is_inside = 0 <= x < width and 0 <= y < height
+            if not is_inside or not is_passable[x, y]:
+                expected = f"({x}, {y}) to be a passable cell of the map"
+                raise line.wrong(expected, "remove the problem, or give the map that it is of")
+        problems.append(problem)
+
     if not problems:
         raise UsageError(f"{path} has no problem: give {_SCENARIO}")
     return problems
-
-
-def _problem(line: Line, is_passable: Booleans) -> Problem:
-    # The second field is a map's name, which may have spaces.
-    fields = line.text.rsplit(maxsplit=_FIELDS - 2)
-    try:
-        width, height, start_x, start_y, goal_x, goal_y = map(int, fields[1:-1])
-        optimal = float(fields[-1])
-    except (ValueError, IndexError):
-        expected = "bucket, map, width, height, start x y, goal x y and the optimal length"
-        raise line.wrong(expected) from None
-
-    map_width, map_height = is_passable.shape
-    if (width, height) != (map_width, map_height):
-        expected = f"a problem for a map of {map_width} x {map_height} cells"
-        raise line.wrong(expected, "give the map of these problems")
-    if not math.isfinite(optimal) or optimal < 0:
-        raise line.wrong("an optimal length that is finite and not below 0")
-
-    problem = Problem((start_x, start_y), (goal_x, goal_y), optimal)
-    for x, y in (problem.start, problem.goal):
-        is_inside = 0 <= x < width and 0 <= y < height
-        if not is_inside or not is_passable[x, y]:
-            expected = f"({x}, {y}) to be a passable cell of the map"
-            raise line.wrong(expected, "remove the problem, or give the map that it is of")
-
-    return problem

@@ -95,26 +95,25 @@ def read(folder: Path) -> Recording:
     if not numbers:
         raise UsageError(f"{folder} has no Robot1_Odometry.dat: give the folder of an MRCLAM set")
 
-    robots = [_robot(folder, number, subject_of) for number in numbers]
+    robots = []
+    for number in numbers:
+        odometry = _table(folder, f"Robot{number}_Odometry", _ODOMETRY)
+        measured = _table(folder, f"Robot{number}_Measurement", _OBSERVATIONS)
+        truth = _table(folder, f"Robot{number}_Groundtruth", _TRUTH)
+
+        subjects = np.array([subject_of.get(int(barcode), 0) for barcode in measured[:, 1]])
+        observations = np.column_stack([measured[:, 0], subjects, measured[:, 2:]])
+        is_known = subjects > 0
+        robot = Robot(
+            number,
+            odometry=_by_time(odometry),
+            observations=_by_time(observations[is_known]),
+            truth=_by_time(truth),
+            unread=int((~is_known).sum()),
+        )
+        robots.append(robot)
+
     return Recording(folder.name, robots, landmarks)
-
-
-def _robot(folder: Path, number: int, subject_of: dict[int, int]) -> Robot:
-    name = f"Robot{number}"
-    odometry = _table(folder, f"{name}_Odometry", _ODOMETRY)
-    measured = _table(folder, f"{name}_Measurement", _OBSERVATIONS)
-    truth = _table(folder, f"{name}_Groundtruth", _TRUTH)
-
-    subjects = np.array([subject_of.get(int(barcode), 0) for barcode in measured[:, 1]])
-    observations = np.column_stack([measured[:, 0], subjects, measured[:, 2:]])
-    is_known = subjects > 0
-    return Robot(
-        number,
-        odometry=_by_time(odometry),
-        observations=_by_time(observations[is_known]),
-        truth=_by_time(truth),
-        unread=int((~is_known).sum()),
-    )
 
 
 def _by_time(rows: Floats) -> Floats:

@@ -93,7 +93,7 @@ def read(path: Path) -> Extract:
     if found.nodes:
         lonlat = continuous(np.array(list(found.nodes.values())))
         found.nodes = dict(zip(found.nodes, map(tuple, lonlat.tolist()), strict=True))
-    rings = [ring for building in found.buildings.values() for ring in _rings(building, found.ways)]
+    rings = [ring for building in found.buildings.values() for ring in building.rings(found.ways)]
     return Extract(found.nodes, found.node_tags, [*found.ways.values(), *rings])
 
 
@@ -118,9 +118,25 @@ class _Elements:
         if element.deleted:
             self.remove(kind, element.id)
         elif isinstance(element, Node):
-            self._enter_node(element)
+            if not element.location.valid():
+                raise UsageError(
+                    f"{self.path}, node {element.id}: expected lon in degrees from -180 to 180 and "
+                    "lat from -90 to 90"
+                )
+            self.nodes[element.id] = (element.lon, element.lat)
+            if tags := dict(element.tags):
+                self.node_tags[element.id] = tags
         elif isinstance(element, ReadWay):
-            self._enter_way(element)
+            nodes = [node.ref for node in element.nodes]
+            if 0 in nodes:
+                raise UsageError(
+                    f"{self.path}, way {element.id}: expected a node's id in each <nd>, as ref"
+                )
+            # Overpass' `out geom` writes the positions of nodes into the ways.
+            for node in element.nodes:
+                if node.location.valid():
+                    self.nodes.setdefault(node.ref, (node.lon, node.lat))
+            self.ways[element.id] = Way(element.id, nodes, dict(element.tags))
         elif element.tags.get("type") == "multipolygon" and "building" in element.tags:
             members = [each for each in element.members if each.type == "w"]
             outer = [each.ref for each in members if each.role != "inner"]
@@ -135,29 +151,6 @@ class _Elements:
         }
         for elements in of_kind[kind]:
             elements.pop(identifier, None)
-
-    def _enter_node(self, node: Node) -> None:
-        if not node.location.valid():
-            raise UsageError(
-                f"{self.path}, node {node.id}: expected lon in degrees from -180 to 180 and lat "
-                "from -90 to 90"
-            )
-        self.nodes[node.id] = (node.lon, node.lat)
-        tags = dict(node.tags)
-        if tags:
-            self.node_tags[node.id] = tags
-
-    def _enter_way(self, way: ReadWay) -> None:
-        nodes = [node.ref for node in way.nodes]
-        if 0 in nodes:
-            raise UsageError(
-                f"{self.path}, way {way.id}: expected a node's id in each <nd>, as ref"
-            )
-        # Overpass' `out geom` writes the positions of nodes into the ways.
-        for node in way.nodes:
-            if node.location.valid():
-                self.nodes.setdefault(node.ref, (node.lon, node.lat))
-        self.ways[way.id] = Way(way.id, nodes, dict(way.tags))
 
 
 def _remove_deleted(found: _Elements, content: bytes) -> None:
@@ -188,36 +181,26 @@ class _Multipolygon:
     ways: list[int]
     tags: Tags
 
-
-def _rings(outlined: _Multipolygon, way_of: dict[int, Way]) -> list[Way]:
-    """Return the outer rings of a multipolygon; none if it is not whole in the extract, or no more
-    than a way that is a building itself.
-    """
-    if not all(way in way_of for way in outlined.ways):
-        return []
-
-    members = [way_of[way] for way in outlined.ways]
-    lines = [way.nodes for way in members if len(way.nodes) > 1 and "building" not in way.tags]
-    rings = []
-    while lines:
-        ring = _joined(lines)
-        if ring[0] != ring[-1]:
+    def rings(self, way_of: dict[int, Way]) -> list[Way]:
+        """Return the outer rings; none if they are not whole in the extract, or no more than a way
+        that is a building itself.
+        """
+        if not all(way in way_of for way in self.ways):
             return []
-        rings.append(Way(outlined.id, ring, outlined.tags))
 
-    return rings
+        members = [way_of[way] for way in self.ways]
+        lines = [way.nodes for way in members if len(way.nodes) > 1 and "building" not in way.tags]
+        rings = []
+        while lines:
+            ring = list(lines.pop(0))
+            while ring[0] != ring[-1]:
+                following = next((line for line in lines if ring[-1] in (line[0], line[-1])), None)
+                if following is None:
+                    return []
 
+                lines.remove(following)
+                onward = following if following[0] == ring[-1] else following[::-1]
+                ring.extend(onward[1:])
+            rings.append(Way(self.id, ring, self.tags))
 
-def _joined(lines: list[list[int]]) -> list[int]:
-    """Join the first of `lines` of nodes with those that continue it, taking them from `lines`."""
-    joined = list(lines.pop(0))
-    while joined[0] != joined[-1]:
-        following = next((line for line in lines if joined[-1] in (line[0], line[-1])), None)
-        if following is None:
-            return joined
-
-        lines.remove(following)
-        onward = following if following[0] == joined[-1] else following[::-1]
-        joined.extend(onward[1:])
-
-    return joined
+        return rings

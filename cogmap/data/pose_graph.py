@@ -129,11 +129,19 @@ def read(path: Path) -> PoseGraphFile:
     )
     i, j = np.where(is_backward, j, i), np.where(is_backward, i, j)
 
-    steps = _first_steps(path, ids, i, j)
+    # The path follows the first edge from each pose to the next.
+    steps = np.flatnonzero(j == i + 1)
+    origins, first = np.unique(i[steps], return_index=True)
+    for gap in np.setdiff1d(np.arange(len(ids) - 1), origins):
+        raise UsageError(
+            f"{path}: no edge leads from pose {ids[gap]} to the next, pose {ids[gap + 1]}: "
+            "add one, or remove the poses on one side"
+        )
+
     if poses:
         placed = np.array(list(poses.values()))
     else:
-        placed = integrate(np.zeros(3), measurement[steps])
+        placed = integrate(np.zeros(3), measurement[steps[first]])
         placed[:, 2] = wrap_angle(placed[:, 2])
     return PoseGraphFile(ids, placed, i, j, measurement, information)
 
@@ -235,21 +243,6 @@ def _reversed(measurement: Floats, information: Floats) -> tuple[Floats, Floats]
 
     inverse = np.linalg.inv(derivative)
     return back, inverse.transpose(0, 2, 1) @ information @ inverse
-
-
-def _first_steps(path: Path, ids: Sequence[int], i: Indices, j: Indices) -> Indices:
-    """Find the first edge from each pose to the next, (n - 1,). Raises UsageError if one is
-    missing.
-    """
-    steps = np.flatnonzero(j == i + 1)
-    origins, first = np.unique(i[steps], return_index=True)
-    for gap in np.setdiff1d(np.arange(len(ids) - 1), origins):
-        raise UsageError(
-            f"{path}: no edge leads from pose {ids[gap]} to the next, pose {ids[gap + 1]}: "
-            "add one, or remove the poses on one side"
-        )
-    found: Indices = steps[first]
-    return found
 
 
 def read_true_positions(path: Path) -> Floats:

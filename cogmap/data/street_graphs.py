@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import msgspec
 
-from cogmap.data.text import PACKED, Line, numbered_lines
+from cogmap.data.text import PACKED, numbered_lines
 
 SUFFIXES = tuple(f".jsonl{packed}" for packed in PACKED)
 Lon = Annotated[float, msgspec.Meta(ge=-180, le=180)]
@@ -55,22 +55,23 @@ class StreetGraph(msgspec.Struct):
 
 def read(path: Path) -> list[StreetGraph]:
     """Read every city in a file. Raises UsageError naming file, line and what was expected."""
-    lines = numbered_lines(path, "street graphs as JSON Lines")
-    return [_graph(line) for line in lines if line.text.strip()]
+    graphs = []
+    for line in numbered_lines(path, "street graphs as JSON Lines"):
+        if not line.text.strip():
+            continue
+        try:
+            graph = msgspec.json.decode(line.text, type=StreetGraph)
+        except (msgspec.DecodeError, msgspec.ValidationError) as error:
+            raise line.wrong(f"a street graph ({error})") from None
 
+        if not graph.edges:
+            raise line.wrong("a street graph with edges")
+        count = len(graph.nodes_lonlat)
+        for edge in graph.edges:
+            ends = edge[:2]
+            if len(ends) < 2 or not all(isinstance(end, int) and 0 <= end < count for end in ends):
+                wrong = line._replace(text=str(edge))
+                raise wrong.wrong(f"an edge between two of {count} nodes, by their numbers")
+        graphs.append(graph)
 
-def _graph(line: Line) -> StreetGraph:
-    try:
-        graph = msgspec.json.decode(line.text, type=StreetGraph)
-    except (msgspec.DecodeError, msgspec.ValidationError) as error:
-        raise line.wrong(f"a street graph ({error})") from None
-
-    if not graph.edges:
-        raise line.wrong("a street graph with edges")
-    count = len(graph.nodes_lonlat)
-    for edge in graph.edges:
-        ends = edge[:2]
-        if len(ends) < 2 or not all(isinstance(end, int) and 0 <= end < count for end in ends):
-            wrong = line._replace(text=str(edge))
-            raise wrong.wrong(f"an edge between two of {count} nodes, by their numbers")
-    return graph
+    return graphs

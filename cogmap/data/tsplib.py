@@ -240,7 +240,7 @@ def stem(path: Path) -> str:
 def lengths(positions: Floats, weight_type: str) -> Floats:
     """(n, n): between (n, 2) positions, rounded as TSPLIB95 prescribes for the type."""
     if weight_type == GEO:
-        return _geo_km(positions)
+        return great_circle_km(positions)
 
     distances = straight(positions)
     if weight_type == ATT:
@@ -258,7 +258,7 @@ def straight(positions: Floats) -> Floats:
     return np.asarray(np.sqrt(squared.sum(axis=-1)))
 
 
-def _geo_km(positions: Floats) -> Floats:
+def great_circle_km(positions: Floats) -> Floats:
     """(n, n): whole kilometres along great circles between latitudes and longitudes as DDD.MM."""
     degrees = np.trunc(positions)
     minutes = positions - degrees

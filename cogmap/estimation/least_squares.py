@@ -58,8 +58,15 @@ class NormalEquations:
 
     def matrix(self, poses: Floats, constraints: Constraints) -> sparse.csc_matrix:
         """J' S^-1 J at `poses`."""
-        blocks = _blocks(poses, constraints)
-        return self._pattern.summed(blocks)
+        by_i, by_j = jacobians(poses, constraints)
+        weighted_i = by_i.mT @ constraints.information
+        weighted_j = by_j.mT @ constraints.information
+
+        # The blocks of each constraint, each transposed, as a _BlockPattern sums them up.
+        at_i = weighted_i @ by_i
+        at_j = weighted_j @ by_j
+        across = weighted_i @ by_j
+        return self._pattern.summed(np.concatenate([at_i, across.mT, across, at_j]))
 
     def gradient(self, poses: Floats, constraints: Constraints) -> Floats:
         """J' S^-1 d at `poses`, (3 (n - 1),)."""
@@ -125,20 +132,6 @@ class _BlockPattern:
 
         columns = (transposed.data, transposed.indices, transposed.indptr)
         return sparse.csc_matrix(columns, shape=self._shape)
-
-
-def _blocks(poses: Floats, constraints: Constraints) -> Floats:
-    """(4 m, 3, 3): the blocks of J' S^-1 J by constraint, each transposed, as a _BlockPattern sums
-    them up.
-    """
-    by_i, by_j = jacobians(poses, constraints)
-    weighted_i = by_i.mT @ constraints.information
-    weighted_j = by_j.mT @ constraints.information
-
-    at_i = weighted_i @ by_i
-    at_j = weighted_j @ by_j
-    across = weighted_i @ by_j
-    return np.concatenate([at_i, across.mT, across, at_j])
 
 
 def _elimination_order(count: int, constraints: Constraints) -> Indices:

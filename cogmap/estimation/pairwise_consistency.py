@@ -85,31 +85,22 @@ def consistent(views: Views, steps: Constraints, false_closure: float) -> Boolea
     `steps` are those of the path; views that agree are taken for disagreeing with probability
     `false_closure`.
     """
-    one, other = _pairs(views)
+    # Each view is compared with those that follow it along the path.
+    count = len(views.i)
+    order = np.lexsort((np.arange(count), views.j))
+    ahead = range(1, min(NEIGHBOURS + 1, count))
+    nothing = np.zeros(0, np.int64)
+    one = np.concatenate([nothing, *(order[:-apart] for apart in ahead)])
+    other = np.concatenate([nothing, *(order[apart:] for apart in ahead)])
+
     path = _DeadReckoning(steps)
     agree = _agree(views.select(one), views.select(other), path, false_closure)
 
-    joined = adjacency(one[agree], other[agree], len(views.i))
+    joined = adjacency(one[agree], other[agree], count)
     joined_by_one = joined @ joined
 
     triangles = joined_by_one.multiply(joined).sum(axis=1)
     return np.asarray(triangles).ravel() > 0
-
-
-def _pairs(views: Views) -> tuple[Indices, Indices]:
-    """Pairs of views to compare, by number: each with those that follow it along the path."""
-    count = len(views.i)
-    numbers = np.arange(count)
-    order = np.lexsort((numbers, views.j))
-
-    nothing = np.zeros(0, np.int64)
-    ones = [nothing]
-    others = [nothing]
-    for apart in range(1, min(NEIGHBOURS + 1, count)):
-        ones.append(order[:-apart])
-        others.append(order[apart:])
-
-    return np.concatenate(ones), np.concatenate(others)
 
 
 class _DeadReckoning:

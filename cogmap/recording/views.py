@@ -52,7 +52,12 @@ def camera_frames(
     images: list[tuple[Record, _Numbered]] = []
     recognised: dict[tuple[int, int], tuple[Record, int]] = {}
     for record in reader.records({topic, topics.PERCEPTS}, progress):
-        numbered = _numbered(reader, record)
+        try:
+            numbered = _decoder.decode(reader.payload(record))
+        except msgspec.DecodeError as error:
+            raise LogError(
+                f"{reader.path}: a message of {record.topic_name} cannot be read: {error}"
+            ) from None
         if record.topic is topic:
             images.append((record, numbered))
         else:
@@ -139,15 +144,6 @@ def depth(array: Array, name: str) -> Depth:
             f"got {array.dtype} {array.shape}"
         )
     return array.numpy().astype(np.float32, copy=False)
-
-
-def _numbered(reader: LogReader, record: Record) -> _Numbered:
-    try:
-        return _decoder.decode(reader.payload(record))
-    except msgspec.DecodeError as error:
-        raise LogError(
-            f"{reader.path}: a message of {record.topic_name} cannot be read: {error}"
-        ) from None
 
 
 def _holds_none(reader: LogReader, what: str) -> str:

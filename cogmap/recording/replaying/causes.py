@@ -68,7 +68,7 @@ class _Planner:
                 envelope = _envelope(record)
                 numbered.append((envelope.seq, without_envelope(record)))
                 for cause in envelope.causes:
-                    step = _step(cause, inputs, envelope.sent_ns)
+                    step = inputs.step(cause, envelope.sent_ns)
                     if step is None:
                         job.missing[cause[0]] += 1
                     else:
@@ -79,20 +79,6 @@ class _Planner:
                 found.append(job)
             earlier += [without_envelope(record) for record in published]
         return found
-
-
-def _step(cause: Cause, inputs: _Inputs, before_ns: int) -> Step | None:
-    """Return what `cause` names, before the message that names it; None if the log lacks it."""
-    name, _, number = cause
-    if name == START:
-        return Step(Kind.START)
-    if name == TIMER:
-        return Step(Kind.TIMER, at_ns=number)
-    if name == SNAPSHOT.name:
-        return Step(Kind.SNAPSHOT, at_ns=before_ns, version=number)
-
-    record = inputs.find(cause)
-    return None if record is None else Step(Kind.FEED, without_envelope(record))
 
 
 class _Inputs:
@@ -109,40 +95,39 @@ class _Inputs:
         self._incarnation: dict[str, int] = {}
         self._last: dict[tuple[str, str], int] = {}
 
-    def find(self, cause: Cause) -> Record | None:
-        """Return the message that `cause` names; None if the log lacks it."""
+    def step(self, cause: Cause, before_ns: int) -> Step | None:
+        """Return what `cause` names, before the message that names it; None if the log lacks it."""
         topic, source, seq = cause
+        if topic == START:
+            return Step(Kind.START)
+        if topic == TIMER:
+            return Step(Kind.TIMER, at_ns=seq)
+        if topic == SNAPSHOT.name:
+            return Step(Kind.SNAPSHOT, at_ns=before_ns, version=seq)
+
         candidates = self._by_cause.get(cause)
         if not candidates:
             return None
 
+        # The candidate of the first incarnation that it can be of; the last one if none can.
         record = candidates[0]
+        current = self._incarnation.get(source)
         if len(candidates) > 1:
-            record = self._choose(candidates, cause)
+            if current is None:
+                fitting = [each for each in candidates if _sent_ns(each) >= self._since_ns]
+            else:
+                last = self._last.get((topic, source), -1)
+                first = current + 1 if seq <= last else current
+                fitting = [each for each in candidates if _incarnation(each) >= first]
+            record = min(fitting, key=_incarnation, default=candidates[-1])
+
         incarnation = _incarnation(record)
-        if self._incarnation.get(source) != incarnation:
+        if current != incarnation:
             # The numbers of a source's earlier incarnations say nothing about this one.
             self._incarnation[source] = incarnation
             self._last = {key: last for key, last in self._last.items() if key[1] != source}
         self._last[topic, source] = seq
-        return record
-
-    def _choose(self, candidates: list[Record], cause: Cause) -> Record:
-        """Return the candidate of the first incarnation that it can be of; the last one if none
-        can.
-        """
-        topic, source, seq = cause
-        current = self._incarnation.get(source)
-        if current is None:
-            fitting = [record for record in candidates if _sent_ns(record) >= self._since_ns]
-        else:
-            last = self._last.get((topic, source), -1)
-            first = current + 1 if seq <= last else current
-            fitting = [record for record in candidates if _incarnation(record) >= first]
-
-        if not fitting:
-            return candidates[-1]
-        return min(fitting, key=_incarnation)
+        return Step(Kind.FEED, without_envelope(record))
 
 
 def _envelope(record: Record) -> Envelope:

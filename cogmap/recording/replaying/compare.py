@@ -59,7 +59,10 @@ def describe(topic: Topic, left: bytes, right: bytes, sides: Sides) -> str:
     if found is not None:
         clause = found.in_words(sides)
     else:
-        clause = f"the same values in other bytes, from byte {_first_byte(left, right)}"
+        pairs = enumerate(zip(left, right, strict=False))
+        shorter = min(len(left), len(right))
+        first_byte = next((index for index, (one, other) in pairs if one != other), shorter)
+        clause = f"the same values in other bytes, from byte {first_byte}"
     return f"{title(topic, first)}: {clause}"
 
 
@@ -137,14 +140,6 @@ def _short(value: Any) -> str:
     if len(text) <= _MAX_SHOWN:
         return text
     return f"{text[:_MAX_SHOWN]}..."
-
-
-def _first_byte(left: bytes, right: bytes) -> int:
-    """Return the index of the first byte that differs; the shorter length if none does."""
-    for index, (one, other) in enumerate(zip(left, right, strict=False)):
-        if one != other:
-            return index
-    return min(len(left), len(right))
 
 
 _COMPARISONS: tuple[tuple[type, Callable[[Any, Any, str], Difference | None]], ...] = (

@@ -32,7 +32,14 @@ class LoggedGraph:
         Raises LogError if the log does not hold every delta up to it.
         """
         if self._commits is None:
-            self._commits = self._read()
+            self._commits = []
+            for record in self._reader.records({topics.DELTA}):
+                delta = self._reader.message(record)
+                assert isinstance(delta, Delta)
+                envelope = record.envelope
+                sent_ns = record.log_time_ns if envelope is None else envelope.sent_ns
+                self._commits.append(_Commit(delta, sent_ns))
+
         positions = (
             position
             for position, commit in reversed(list(enumerate(self._commits, start=1)))
@@ -56,12 +63,3 @@ class LoggedGraph:
                 f"does not hold every delta up to it: record from the start of the workspace"
             )
         return self._graph.snapshot()
-
-    def _read(self) -> list[_Commit]:
-        commits = []
-        for record in self._reader.records({topics.DELTA}):
-            delta = self._reader.message(record)
-            assert isinstance(delta, Delta)
-            sent_ns = record.log_time_ns if record.envelope is None else record.envelope.sent_ns
-            commits.append(_Commit(delta, sent_ns))
-        return commits

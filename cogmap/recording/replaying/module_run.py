@@ -50,7 +50,19 @@ class ModuleRun:
             for message in self._do(step):
                 self._compare(message)
 
-        self._count_missing()
+        # The outputs that are in the log alone.
+        missing: list[Record] = []
+        for name, expected in self._job.expected.items():
+            published = self._published[name]
+            missing += [record for seq, record in expected.items() if seq not in published]
+
+        self.outcome.missing_outputs = len(missing)
+        if missing and not self.outcome.first:
+            first = min(missing, key=lambda one: (one.log_time_ns, one.channel, one.sequence))
+            title = compare.title(first.topic, self._reader.message(first))
+            log, replay = SIDES
+            self._differ(f"{title} is in {log} and not published in {replay}")
+
         self.outcome.notes += self._notes()
         return self.outcome
 
@@ -62,7 +74,11 @@ class ModuleRun:
             if step.record is not None:
                 return self._feed(step.record)
             if step.kind is Kind.SNAPSHOT:
-                return self._load(step)
+                graph = self._module.graph
+                if graph is None:
+                    raise MessageError("it does not follow the graph")
+                graph.load(self._logged_graph.at(step.version, step.at_ns))
+                return self._module.loaded()
             if step.kind is Kind.START:
                 start = self._module.start
                 return [] if start is None else self._module.stamp(start())
@@ -103,14 +119,6 @@ class ModuleRun:
             )
         return published
 
-    def _load(self, step: Step) -> list[Message]:
-        """Load the graph as the log's own deltas made it."""
-        graph = self._module.graph
-        if graph is None:
-            raise MessageError("it does not follow the graph")
-        graph.load(self._logged_graph.at(step.version, step.at_ns))
-        return self._module.loaded()
-
     def _compare(self, message: Message) -> None:
         """Compare what was published with the message of that number in the log."""
         topic = topics.of(message)
@@ -132,20 +140,6 @@ class ModuleRun:
         self.outcome.different += 1
         if not self.outcome.first:
             self._differ(compare.describe(topic, recorded, payload, SIDES))
-
-    def _count_missing(self) -> None:
-        """Count the outputs that are in the log alone, and name the first."""
-        missing: list[Record] = []
-        for name, expected in self._job.expected.items():
-            published = self._published[name]
-            missing += [record for seq, record in expected.items() if seq not in published]
-
-        self.outcome.missing_outputs = len(missing)
-        if missing and not self.outcome.first:
-            first = min(missing, key=lambda one: (one.log_time_ns, one.channel, one.sequence))
-            title = compare.title(first.topic, self._reader.message(first))
-            log, replay = SIDES
-            self._differ(f"{title} is in {log} and not published in {replay}")
 
     def _notes(self) -> list[str]:
         """Return what else is to be known before the outcome is judged."""

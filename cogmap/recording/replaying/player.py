@@ -13,7 +13,7 @@ from cogmap.bus.codec import Envelope
 from cogmap.bus.interface import Bus, Member
 from cogmap.errors import UsageError
 from cogmap.recording.replaying.pacing import ClockPublisher, Control, Pacer
-from cogmap.recording.storage.reader import LogReader, Record
+from cogmap.recording.storage.reader import LogReader
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Scope, Topic
 
@@ -60,11 +60,20 @@ class Player:
         self._choices = choices
         self._control = control
         self._pacer = Pacer(choices.rate, control)
-        self._topics = self._chosen()
         self._incarnations: dict[tuple[str, int], int] = {}
         self._played: Counter[str] = Counter()
+
+        # What of the log is played, in the order of the table.
+        recorded = {channel.topic for channel in reader.channels.values()}
+        chosen = choices.topics
+        if chosen is None:
+            chosen = [topic for topic in topics.ALL if topic.scope is not Scope.PROCESS]
+        self._topics = [each for each in topics.ALL if each.name in recorded and each in chosen]
+
         self._clock: ClockPublisher | None = None
         if choices.clock_hz > 0:
+            # The log's clock is not played beside the player's own.
+            self._topics = [topic for topic in self._topics if topic is not topics.CLOCK]
             self._clock = ClockPublisher(bus, SOURCE, choices.rate, choices.clock_hz)
 
     def play(self) -> Played:
@@ -85,20 +94,6 @@ class Player:
             late_max_s=self._pacer.late_max_s,
         )
 
-    def _chosen(self) -> list[Topic]:
-        """Return what of the log is played, in the order of the table. The log's clock is not if
-        the player has its own.
-        """
-        recorded = {channel.topic for channel in self._reader.channels.values()}
-        chosen = self._choices.topics
-        if chosen is None:
-            chosen = [topic for topic in topics.ALL if topic.scope is not Scope.PROCESS]
-
-        found = [topic for topic in topics.ALL if topic.name in recorded and topic in chosen]
-        if self._choices.clock_hz > 0:
-            found = [topic for topic in found if topic is not topics.CLOCK]
-        return found
-
     def _play_once(self) -> None:
         """Play the log once; the clock ends with its newest stamp.
 
@@ -114,30 +109,27 @@ class Player:
                 continue
             if not self._pacer.wait_until(record.log_time_ns, self._clock):
                 return
-            self._publish(record)
+
+            # The message travels in an envelope of today, which is as old as it was then.
+            stub = self._reader.stub(record)
+            then_ns = record.log_time_ns
+            recorded = record.envelope or Envelope(stub.source, stub.seq, 0, then_ns, then_ns)
+            now_ns = time_ns()
+            age_ns = max(0, recorded.sent_ns - recorded.born_ns)
+            key = (recorded.source, recorded.incarnation)
+            renewed = Envelope(
+                source=recorded.source,
+                seq=recorded.seq,
+                incarnation=self._incarnations.setdefault(key, now_ns),
+                sent_ns=now_ns,
+                born_ns=now_ns - age_ns,
+                stages=recorded.stages,
+                causes=recorded.causes,
+            )
+            self._bus.publish(record.topic, self._reader.payload(record), renewed)
+            self._played[record.topic_name] += 1
+            if self._clock is not None:
+                self._clock.see(stub.stamp_ns)
 
         if self._clock is not None:
             self._clock.publish()
-
-    def _publish(self, record: Record) -> None:
-        """Publish a message in an envelope of today, which is as old as it was then."""
-        stub = self._reader.stub(record)
-        then_ns = record.log_time_ns
-        recorded = record.envelope or Envelope(stub.source, stub.seq, 0, then_ns, then_ns)
-
-        now_ns = time_ns()
-        age_ns = max(0, recorded.sent_ns - recorded.born_ns)
-        key = (recorded.source, recorded.incarnation)
-        renewed = Envelope(
-            source=recorded.source,
-            seq=recorded.seq,
-            incarnation=self._incarnations.setdefault(key, now_ns),
-            sent_ns=now_ns,
-            born_ns=now_ns - age_ns,
-            stages=recorded.stages,
-            causes=recorded.causes,
-        )
-        self._bus.publish(record.topic, self._reader.payload(record), renewed)
-        self._played[record.topic_name] += 1
-        if self._clock is not None:
-            self._clock.see(stub.stamp_ns)

@@ -6,6 +6,7 @@ from bisect import bisect_left
 from collections import OrderedDict, defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
 
@@ -67,6 +68,9 @@ class _Located(NamedTuple):
     chunk: int
     position: int
     message: Written
+
+
+_ORDER = attrgetter("order")
 
 
 class LogReader:
@@ -135,13 +139,13 @@ class LogReader:
                 if start_ns <= message.log_time < end_ns:
                     order = message.log_time, self._chunks[number].offset, position
                     waiting.append(_Located(order, number, position, message))
-            waiting.sort(key=_order)
+            waiting.sort(key=_ORDER)
 
             # Chunks may overlap: what is as late as the next one's first message waits for it.
             ready = len(waiting)
             if number + 1 < len(self._chunks):
                 next_begins: tuple[int, ...] = (self._chunks[number + 1].first_ns,)
-                ready = bisect_left(waiting, next_begins, key=_order)
+                ready = bisect_left(waiting, next_begins, key=_ORDER)
             yield from self._with_envelopes(waiting[:ready], topics)
             del waiting[:ready]
 
@@ -232,10 +236,6 @@ class LogReader:
         if len(self._cache) > _CACHED_CHUNKS:
             self._cache.popitem(last=False)
         return messages
-
-
-def _order(located: _Located) -> tuple[int, ...]:
-    return located.order
 
 
 def _take(candidates: list[bytes], topic_name: str) -> Envelope | None:

@@ -71,34 +71,28 @@ class SequenceTracker:
         """Take note of one message."""
         key = (topic.name, envelope.source, envelope.incarnation)
         stream = self._streams.get(key)
-        if stream is None:
-            self._streams[key] = self._begun(topic, envelope)
-        else:
+        if stream is not None:
             stream.follow(envelope.seq)
+            return
 
-    def _begun(self, topic: Topic, envelope: Envelope) -> Stream:
-        """Return the stream that begins with a message; the source's stream before it has ended.
-
-        What came before the message is missing if it should be there.
-        """
-        seq = envelope.seq
         stream = Stream(
             topic=topic,
             source=envelope.source,
             incarnation=envelope.incarnation,
             earlier=envelope.earlier,
-            last=seq,
+            last=envelope.seq,
         )
+        self._streams[key] = stream
         is_new = self._since_ns is not None and stream.incarnation > self._since_ns
-        if is_new and seq > 0:
-            stream.missing.append((0, seq))
+        if is_new and stream.last > 0:
+            stream.missing.append((0, stream.last))
 
-        key = topic.name, stream.source
-        before = self._newest.get(key)
-        self._newest[key] = stream
+        # The source's stream before it has ended.
+        of_source = topic.name, stream.source
+        before = self._newest.get(of_source)
+        self._newest[of_source] = stream
         if before is not None and UNKNOWN not in (before.earlier, stream.earlier):
             before.end(stream.earlier - before.earlier)
-        return stream
 
     @property
     def streams(self) -> list[Stream]:
@@ -111,7 +105,19 @@ class SequenceTracker:
         """
         broken = [stream for stream in self.streams if stream.missing]
         broken.sort(key=lambda stream: stream.topic.delivery is not Delivery.NEVER_DROP)
-        return [_sentence(stream) for stream in broken]
+        sentences = []
+        for stream in broken:
+            spans = []
+            for start, end in stream.missing[:_MAX_SPANS]:
+                spans.append(f"{start}" if start == end - 1 else f"{start} to {end - 1}")
+            rest = len(stream.missing) - _MAX_SPANS
+            more = f" and {rest} more spans" if rest > 0 else ""
+            sentences.append(
+                f"{stream.topic.name} ({stream.topic.delivery.value}): {stream.lost} of "
+                f"{stream.source} missing, number {', '.join(spans)}{more}"
+            )
+
+        return sentences
 
     def lost(self) -> dict[str, int]:
         """Return how many messages are missing, by topic."""
@@ -121,16 +127,3 @@ class SequenceTracker:
                 name = stream.topic.name
                 lost[name] = lost.get(name, 0) + stream.lost
         return lost
-
-
-def _sentence(stream: Stream) -> str:
-    spans = []
-    for start, end in stream.missing[:_MAX_SPANS]:
-        spans.append(f"{start}" if start == end - 1 else f"{start} to {end - 1}")
-    rest = len(stream.missing) - _MAX_SPANS
-    more = f" and {rest} more spans" if rest > 0 else ""
-    topic = stream.topic
-    return (
-        f"{topic.name} ({topic.delivery.value}): {stream.lost} of {stream.source} missing, "
-        f"number {', '.join(spans)}{more}"
-    )

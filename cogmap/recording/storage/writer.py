@@ -42,7 +42,10 @@ class LogWriter:
         self.note(layout.RECORDING, {"software": layout.SOFTWARE, **about})
 
         self._envelopes = self._channel(layout.ENVELOPES, layout.envelope_schema(), {})
-        self._channels = {topic: self._topic_channel(topic) for topic in topics}
+        self._channels: dict[Topic, int] = {}
+        for topic in topics:
+            facts = {"delivery": topic.delivery.name, "about": topic.scope.name}
+            self._channels[topic] = self._channel(topic.name, layout.schema_of(topic), facts)
 
     def write(
         self, topic: Topic, payload: bytes | memoryview, envelope: Envelope | None, received_ns: int
@@ -94,14 +97,6 @@ class LogWriter:
             with suppress(OSError):
                 self._file.close()
             raise cannot_write(self.path, error) from None
-
-    def _topic_channel(self, topic: Topic) -> int:
-        schema = layout.schema_of(topic)
-        facts = {
-            "delivery": topic.delivery.name,
-            "about": topic.scope.name,
-        }
-        return self._channel(topic.name, schema, facts)
 
     def _channel(self, topic: str, schema: tuple[str, bytes], facts: dict[str, str]) -> int:
         name, text = schema
