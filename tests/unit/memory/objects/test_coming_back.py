@@ -18,13 +18,14 @@ INN = object_id("inn")
 TOWN_M = {"inn": (30.0, 6.0), "mill": (32.0, -7.0)}
 ROAD = ((2.0, 0.0), (3.0, 0.5))
 STEP_S = 0.2
+CONSCIOUS_VIEWS = 4
 
 
 class Life:
     """A workspace whose base levels decay within seconds, and the memory that follows it."""
 
     def __init__(self) -> None:
-        self.desk = Desk("w1", base_level_decay=0.02, kept_base_level=0.0)
+        self.desk = Desk("w1", base_level_decay=0.02)
         self.memory = build(Config(store_cycles=1, recall_cycles=1), "memory")
         self.recalled: list[Object] = []
         self.stored: list[str] = []
@@ -77,9 +78,11 @@ class Life:
 def learned_and_left() -> Life:
     """An agent that has learned an inn, and has gone far away for so long that it has decayed."""
     life = Life()
-    for _ in range(12):
+    for view in range(12):
         life.move(1.0, *TOWN_M)
-        life.tell(*life.desk.graph.of_kind(Object))
+        # What is conscious too often is never forgotten.
+        if view < CONSCIOUS_VIEWS:
+            life.tell(*life.desk.graph.of_kind(Object))
 
     life.move(-400.0)
     for _ in range(60):
