@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.services.codelets.planning.network import Cell
 
 MAX_CELLS = 100
@@ -19,11 +19,12 @@ _AT_ONCE = 12
 _INSIDE = 0.49
 
 
-def straightened(route: Indices, cost: Floats, origin: Cell) -> Floats:
+def straightened(route: Indices, cost: Floats, is_clear: Booleans, origin: Cell) -> Floats:
     """Replace the bends of a route of (n, 2) neighbouring cells by straight lines of at most
-    MAX_CELLS, if these are no dearer by the cost of places, (w, h) from the cell `origin`.
+    MAX_CELLS, if these are no dearer by the cost of places, and lead over clear ones alone; (w, h)
+    each, from the cell `origin`.
 
-    Its (m, 2) positions are in cells, each nearest to the cell that it leads over: between the
+    The (m, 2) positions are in cells, each nearest to the cell that it leads over: between the
     middles of two cells a straight line has no steps, at which an agent would slow down.
     """
     inside = route - np.array(origin)
@@ -31,10 +32,11 @@ def straightened(route: Indices, cost: Floats, origin: Cell) -> Floats:
     dearer = np.maximum(cost[tuple(inside[:-1].T)], cost[tuple(inside[1:].T)])
     spent = np.concatenate([[0.0], np.cumsum(steps * dearer)])
 
+    line_cost = np.where(is_clear, cost, np.inf)
     positions = [inside[:1].astype(np.float64)]
     at = 0
     while at < len(inside) - 1:
-        end = _farthest(inside, spent, cost, at)
+        end = _farthest(inside, spent, line_cost, at)
         cells, _ = straight(inside[at], inside[end][None])
         exact = np.linspace(inside[at], inside[end], len(cells[0]))
         positions.append(exact.clip(cells[0] - _INSIDE, cells[0] + _INSIDE)[1:])

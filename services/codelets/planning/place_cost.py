@@ -55,8 +55,8 @@ class PlaceCosts(NamedTuple):
 
     `layers`: (w, h) factors of at least 1, infinite where a place is blocked. `is_inside` (w, h):
     in the corridor that is planned on. `is_free` (w, h): nothing blocks the place. `is_known`
-    (w, h): seen as road, or driven over. `is_return` (w, h): where the agent came from.
-    `is_visited` (w, h): seen from as near as can be.
+    (w, h): seen as road, or driven over. `is_clear` (w, h): nothing stands there or beside.
+    `is_return` (w, h): where the agent came from. `is_visited` (w, h): seen from as near as can be.
     """
 
     grid: PlaceGrid
@@ -64,6 +64,7 @@ class PlaceCosts(NamedTuple):
     is_inside: Booleans
     is_free: Booleans
     is_known: Booleans
+    is_clear: Booleans
     is_return: Booleans
     is_visited: Booleans
 
@@ -72,11 +73,12 @@ class PlaceCosts(NamedTuple):
         """Mark the places that are known and that nothing blocks, (w, h)."""
         return np.asarray(self.is_known & self.is_free)
 
-    def cost(self) -> Floats:
-        """Multiply the layers, (w, h)."""
+    def cost(self, *without: CostLayer) -> Floats:
+        """Multiply the layers, but for some, (w, h)."""
         product: Floats = np.where(self.is_inside, 1.0, np.inf)
-        for factor in self.layers.values():
-            product *= factor
+        for layer, factor in self.layers.items():
+            if layer not in without:
+                product *= factor
         return product
 
     def network(self) -> PlaceNetwork:
@@ -135,6 +137,7 @@ def place_costs(
         is_inside=np.ones(ground.grid.shape, bool) if within is None else within.is_inside,
         is_free=~is_blocked,
         is_known=is_known,
+        is_clear=~ndimage.binary_dilation(is_obstacle, SQUARE),
         is_return=is_return,
         is_visited=ground.is_visited(),
     )

@@ -192,7 +192,8 @@ def planned(situation: Situation, costs: PlaceCosts) -> Outcome:
     if found:
         ordered = _ordered(found, start, situation, network)
         cells = ordered[0].route
-        line = straightened(cells, costs.cost(), network.origin)
+        cost = costs.cost(CostLayer.BESIDE)
+        line = straightened(cells, cost, costs.is_clear, network.origin)
         return outcome(
             state=PlanState.READY,
             goals=[visit.goal.id for visit in ordered],

@@ -32,14 +32,14 @@ def _cells(line: Floats) -> Indices:
 
 
 def test_over_clear_ground_a_route_leads_straight_to_its_end() -> None:
-    line = straightened(_bent(), CLEAR, (0, 0))
+    line = straightened(_bent(), CLEAR, np.isfinite(CLEAR), (0, 0))
 
     assert _aside(_bent().astype(np.float64)) > 2.0
     assert _aside(line) < 0.02
 
 
 def test_a_straight_route_leads_from_neighbour_to_neighbour() -> None:
-    route = _cells(straightened(_bent(), CLEAR, (0, 0)))
+    route = _cells(straightened(_bent(), CLEAR, np.isfinite(CLEAR), (0, 0)))
 
     assert route[0].tolist() == [0, 10]
     assert route[-1].tolist() == [30, 20]
@@ -49,7 +49,7 @@ def test_a_straight_route_leads_from_neighbour_to_neighbour() -> None:
 def test_a_straight_route_is_no_longer_by_its_links() -> None:
     network = grid_network(CLEAR == 1)
 
-    route = _cells(straightened(_bent(), CLEAR, (0, 0)))
+    route = _cells(straightened(_bent(), CLEAR, np.isfinite(CLEAR), (0, 0)))
 
     assert cost_m(network, route) <= cost_m(network, _bent())
 
@@ -65,7 +65,7 @@ def test_a_straight_route_leads_over_no_ground_that_is_not_clear() -> None:
     cost = _walled((slice(5, 25), slice(12, 14)))
     before = [(0, j) for j in range(5, 9)] + [(j - 8, j) for j in range(9, 13)]
     after = [(4, 13), (5, 14), *((i, 14) for i in range(6, 20))]
-    route = _cells(straightened(np.array(before + after), cost, (0, 0)))
+    route = _cells(straightened(np.array(before + after), cost, np.isfinite(cost), (0, 0)))
 
     assert np.isfinite(cost[tuple(route.T)]).all()
     assert route.tolist() != before + after
@@ -74,7 +74,7 @@ def test_a_straight_route_leads_over_no_ground_that_is_not_clear() -> None:
 def test_a_straight_route_passes_diagonally_between_no_two_corners() -> None:
     cost = _walled((slice(11, 40), slice(0, 11)))
     bend = [(i, 10) for i in range(5, 11)] + [(10, 11), *((i, 11) for i in range(11, 16))]
-    route = _cells(straightened(np.array(bend), cost, (0, 0)))
+    route = _cells(straightened(np.array(bend), cost, np.isfinite(cost), (0, 0)))
 
     i, j = route.T
     assert np.isfinite(cost[i[1:], j[:-1]]).all()
@@ -85,18 +85,27 @@ def test_a_line_over_dearer_ground_is_not_taken() -> None:
     cost = np.full(CLEAR.shape, 2.0)
     cost[tuple(_bent().T)] = 1.0
 
-    assert straightened(_bent(), cost, (0, 0)).tolist() == _bent().tolist()
+    assert straightened(_bent(), cost, np.isfinite(cost), (0, 0)).tolist() == _bent().tolist()
+
+
+def test_a_line_beside_what_stands_there_is_not_taken() -> None:
+    is_clear = np.zeros(CLEAR.shape, bool)
+
+    assert straightened(_bent(), CLEAR, is_clear, (0, 0)).tolist() == _bent().tolist()
 
 
 def test_a_route_is_straightened_wherever_its_ground_begins() -> None:
     origin = np.array([-7, 12])
-    route = straightened(_bent() + origin, CLEAR, (-7, 12))
+    route = straightened(_bent() + origin, CLEAR, np.isfinite(CLEAR), (-7, 12))
 
-    assert route.tolist() == (straightened(_bent(), CLEAR, (0, 0)) + origin).tolist()
+    assert (
+        route.tolist()
+        == (straightened(_bent(), CLEAR, np.isfinite(CLEAR), (0, 0)) + origin).tolist()
+    )
 
 
 def test_a_route_of_one_place_stays() -> None:
-    assert straightened(np.array([[3, 4]]), CLEAR, (0, 0)).tolist() == [[3, 4]]
+    assert straightened(np.array([[3, 4]]), CLEAR, np.isfinite(CLEAR), (0, 0)).tolist() == [[3, 4]]
 
 
 def test_a_straight_line_is_the_same_wherever_it_is_drawn() -> None:
