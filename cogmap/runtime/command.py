@@ -20,6 +20,7 @@ def run_command(command: click.Command, name: str, called: str | None = None) ->
     Ends the process after an error: with 2 if the user can mend it, with 1 for another failure of
     ours, with 130 after Ctrl-C; with 0 if the reader of the output has closed it: it has enough.
     """
+    output = sys.stdout
     try:
         command(standalone_mode=False, prog_name=called)
         if sys.stdout is not None:
@@ -35,9 +36,9 @@ def run_command(command: click.Command, name: str, called: str | None = None) ->
     except BrokenPipeError:
         _discard_output()
         sys.exit(0)
-    except SystemExit as end:
-        # Click ends with 1 because of a closed pipe, whatever its mode.
-        if not isinstance(end.__context__, BrokenPipeError):
+    except SystemExit:
+        # Click ends with 1 because of a closed pipe, having wrapped the output that failed.
+        if sys.stdout is output:
             raise
         _discard_output()
         sys.exit(0)
