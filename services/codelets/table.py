@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from typing import NamedTuple
 
 import msgspec
@@ -74,14 +74,24 @@ def own_settings() -> dict[str, type[msgspec.Struct]]:
 def all_codelets() -> tuple[Codelet, ...]:
     """Our codelets, then those of other packages, by name.
 
-    Raises ConfigError if an entry point is no codelet, or a name is taken.
+    Raises ConfigError if an entry point is no codelet or cannot be imported, or a name is taken.
     """
     codelets = list(own_codelets())
     names = {codelet.name for codelet in codelets}
     points = sorted(entry_points(group=ENTRY_POINTS), key=lambda point: point.name)
 
     for point in points:
-        codelet = _declared(point)
+        try:
+            codelet = point.load()
+        except Exception as error:  # another package's code may raise anything as it is imported
+            reason = f"{type(error).__name__}: {error}"
+            raise ConfigError(
+                f"entry point {point.name} = {point.value} cannot be imported ({reason}): "
+                "mend or uninstall its package"
+            ) from error
+
+        if not isinstance(codelet, Codelet):
+            raise ConfigError(f"entry point {point.name} = {point.value} is no Codelet")
         if codelet.name in names:
             raise ConfigError(f"entry point {point.name}: there is a codelet {codelet.name!r}")
 
@@ -89,24 +99,6 @@ def all_codelets() -> tuple[Codelet, ...]:
         codelets.append(codelet)
 
     return tuple(codelets)
-
-
-def _declared(point: EntryPoint) -> Codelet:
-    """The codelet that an entry point names. Raises ConfigError if it names none, or cannot be
-    imported.
-    """
-    try:
-        loaded = point.load()
-    except Exception as error:  # another package's code may raise anything as it is imported
-        reason = f"{type(error).__name__}: {error}"
-        raise ConfigError(
-            f"entry point {point.name} = {point.value} cannot be imported ({reason}): "
-            "mend or uninstall its package"
-        ) from error
-
-    if not isinstance(loaded, Codelet):
-        raise ConfigError(f"entry point {point.name} = {point.value} is no Codelet")
-    return loaded
 
 
 def configured(

@@ -124,26 +124,22 @@ def _absence(node: Object, agent: Self, rays: Floats, around: Iterable[Object]) 
     before_m = away_m - HIDING_SHARE * node.width_m / 2 - BEYOND_M
     has_ended = ~has_passed & (ranges_m < before_m)
     is_clear = float((has_passed | has_ended).mean()) >= PASSED_SHARE
-    if is_clear and _is_in_sight(node, agent, around):
-        return UNSEEN
-    return 0
+    if not is_clear:
+        return 0
 
-
-def _is_in_sight(node: Object, agent: Self, around: Iterable[Object]) -> bool:
-    """Return whether nothing on the map hides the middle of an object."""
-    away_m = math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m))
+    # It is in sight if nothing on the map hides its middle.
     middle_rad = math.atan2(SEEN_SHARE * node.width_m / 2, away_m)
     for other in around:
         other_m = math.dist((other.x_m, other.y_m), (agent.x_m, agent.y_m))
         if other.id == node.id or other_m >= away_m:
             continue
 
-        half_rad = math.atan2(HIDING_SHARE * other.width_m / 2, other_m)
-        aside_rad = math.remainder(_bearing_of(other, agent) - _bearing_of(node, agent), math.tau)
-        if abs(aside_rad) <= half_rad + middle_rad:
-            return False
+        hidden_rad = math.atan2(HIDING_SHARE * other.width_m / 2, other_m)
+        other_rad = math.remainder(_bearing_of(other, agent) - _bearing_of(node, agent), math.tau)
+        if abs(other_rad) <= hidden_rad + middle_rad:
+            return 0
 
-    return True
+    return UNSEEN
 
 
 def _bearing_of(node: Object, agent: Self) -> float:

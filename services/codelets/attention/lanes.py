@@ -37,19 +37,17 @@ class Lane(NamedTuple):
 
 
 def lanes(agent: Self, graph: Graph) -> list[Lane]:
-    """The straight parts of the plan's route ahead and of the path that the agent drove."""
+    """The straight parts of the plan's route ahead, where it was seen to be road, and of the path
+    that the agent drove.
+    """
     path = rows_of(graph.path)
     driven = Lane(path[:, POSITION], path[:, PathColumn.HEADING_RAD])
-    return [_route_ahead(agent, graph), driven.where(_is_straight(driven))]
+    driven = driven.where(_is_straight(driven))
 
-
-def _route_ahead(agent: Self, graph: Graph) -> Lane:
-    """The plan's route from the place nearest to the agent on, where it was seen to be road; none
-    of a plan that is to find out whether a street is closed.
-    """
+    # A plan that is doubtful is to find out whether a street is closed.
     plan = graph.get(Plan, PLAN_ID)
     if plan is None or plan.route is None or plan.doubtful or plan.map != agent.map:
-        return Lane(np.zeros((0, 2)), np.zeros(0))
+        return [driven]
 
     route_m = np.asarray(plan.route.numpy(), np.float64)
     away_m = np.hypot(*(route_m - (agent.x_m, agent.y_m)).T)
@@ -70,7 +68,7 @@ def _route_ahead(agent: Self, graph: Graph) -> Lane:
     window = graph.places.window(plan.map, [PlaceColumn.ROAD], around)
     i, j = (cells - lower).T
     is_road = window.column(PlaceColumn.ROAD)[i, j] >= ROAD_FROM
-    return lane.where(_is_straight(lane) & is_road)
+    return [lane.where(_is_straight(lane) & is_road), driven]
 
 
 def _is_straight(lane: Lane) -> Booleans:

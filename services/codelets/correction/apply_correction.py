@@ -83,8 +83,19 @@ def moved(graph: Graph, rows: Floats) -> list[Operation]:
         if not np.array_equal(before, after):
             operations.append(with_rows(segment, after))
 
-    if graph.agent is not None:
-        operations += _move_self(graph, graph.agent, rows[-1:])
+    # The agent moves with the last place of its path.
+    agent = graph.agent
+    if agent is not None:
+        samples = agent.samples.numpy()
+        poses = _moved_poses(samples[:, :POSE_COLUMNS], rows[-1:])
+        samples = np.column_stack([poses, samples[:, POSE_COLUMNS:]])
+        x_m, y_m = samples[:, :2].mean(axis=0).tolist()
+        heading_rad = float(mean_pose(samples)[2])
+        moved_agent = msgspec.structs.replace(
+            agent, x_m=x_m, y_m=y_m, heading_rad=heading_rad, samples=Matrix.of(samples)
+        )
+        operations += [moved_agent, _place_link(moved_agent, graph)]
+
     operations += _move_objects(graph, rows, path)
     operations += _move_maps(graph, rows)
     operations += move_places(graph, rows[:, OLD], rows[:, NEW])
@@ -111,22 +122,6 @@ def _moved_poses(poses: Floats, rows: Floats) -> Floats:
     headings_rad = wrap_angle(poses[:, 2] + turned_rad)
 
     return np.column_stack([positions_m, headings_rad])
-
-
-def _move_self(graph: Graph, agent: Self, last: Floats) -> list[Operation]:
-    """The agent moves with the last place of its path."""
-    samples = agent.samples.numpy()
-    poses = _moved_poses(samples[:, :POSE_COLUMNS], last)
-    moved = np.column_stack([poses, samples[:, POSE_COLUMNS:]])
-    x_m, y_m = moved[:, :2].mean(axis=0).tolist()
-    after = msgspec.structs.replace(
-        agent,
-        x_m=x_m,
-        y_m=y_m,
-        heading_rad=float(mean_pose(moved)[2]),
-        samples=Matrix.of(moved),
-    )
-    return [after, _place_link(after, graph)]
 
 
 def _move_objects(graph: Graph, rows: Floats, path: Floats) -> list[Operation]:

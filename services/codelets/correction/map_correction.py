@@ -16,7 +16,7 @@ from scipy.special import chdtri
 from cogmap.estimation.alignment import motion_onto
 from cogmap.estimation.gnc import inliers
 from cogmap.estimation.least_squares import optimize
-from cogmap.estimation.pairwise_consistency import MIN_AGREEING, Views, consistent
+from cogmap.estimation.pairwise_consistency import MIN_AGREEING, consistent
 from cogmap.estimation.pose_graph import (
     NO_CONSTRAINTS,
     Constraints,
@@ -125,7 +125,20 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])
     poses, replays = corrected(judgement.path, seen, config)
     if config.anchor == "map":
-        poses = _in_place(poses, judgement.path.poses, rows, closures)
+        # Moved as one to where the path was believed to be as far as earlier corrections reach;
+        # without any, to where it was corrected from.
+        corrected_until_ns = max(
+            (each.to_ns for each in closures if each.accepted), default=NEVER_NS
+        )
+        is_settled = rows[:, STAMP] * 1e9 <= corrected_until_ns
+        before = rows[:, POSE]
+        if not is_settled.any():
+            is_settled[:] = True
+            before = judgement.path.poses
+
+        motion = motion_onto(poses[is_settled, :2], before[is_settled, :2])
+        positions_m = transform_from(motion, poses[:, :2])
+        poses = np.column_stack([positions_m, wrap_angle(poses[:, 2] + motion[2])])
 
     moved = np.column_stack([rows[:, STAMP], rows[:, POSE], poses])
     operations.append(Correction(id=CORRECTION_ID, base_level=1.0, rows=Matrix.of(moved)))
@@ -199,11 +212,23 @@ def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config)
         closures=NO_CONSTRAINTS,
         joins=joins_of(path, rows[:, STAMP]),
     )
-    corrected_path, holds = _accepted(start, views.select(is_consistent))
+    # A landmark's constraint depends on the agent's heading: it is computed again if the
+    # optimization changes that.
+    chosen = views.select(is_consistent)
+    loops = constraints_of(chosen, start.poses)
+    for _ in range(MAX_ROUNDS):
+        holds = inliers(start.with_closures(loops), FALSE_CLOSURE)
+        graph = start.with_closures(loops.select(holds))
+        again = constraints_of(chosen, optimize(graph))
+
+        turned_rad = np.abs(wrap_angle(again.measurement[:, 2] - loops.measurement[:, 2]))
+        if turned_rad.max(initial=0.0) < SAME_RAD:
+            break
+        loops = again
 
     is_accepted = np.zeros(len(closures), bool)
     is_accepted[is_consistent] = holds
-    return _Judgement(is_consistent, is_accepted, corrected_path)
+    return _Judgement(is_consistent, is_accepted, graph)
 
 
 def _start(poses: Floats, steps: Constraints) -> Floats:
@@ -221,27 +246,6 @@ def _start(poses: Floats, steps: Constraints) -> Floats:
     return np.column_stack([poses[0, :2] + moved_m, wrap_angle(heading_rad)])
 
 
-def _accepted(start: PoseGraph, views: Views) -> tuple[PoseGraph, Booleans]:
-    """The path with the loops that are accepted, and which of `views` those are. It has none at the
-    `start`.
-
-    A landmark's constraint depends on the agent's heading: it is computed again if the optimization
-    changes that.
-    """
-    loops = constraints_of(views, start.poses)
-    for _ in range(MAX_ROUNDS):
-        holds = inliers(start.with_closures(loops), FALSE_CLOSURE)
-        graph = start.with_closures(loops.select(holds))
-        again = constraints_of(views, optimize(graph))
-
-        turned_rad = np.abs(wrap_angle(again.measurement[:, 2] - loops.measurement[:, 2]))
-        if turned_rad.max(initial=0.0) < SAME_RAD:
-            break
-        loops = again
-
-    return graph, holds
-
-
 def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
     """(n, 3) poses with all loops closed, by the paper's rule or with the headings, and how often
     the whole path was replayed for that: reverse replays of eq. 9, or solutions with the headings.
@@ -254,19 +258,3 @@ def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats
         return np.column_stack([found.positions_m, graph.poses[:, 2]]), found.replays
 
     return optimize_jointly(graph, seen, config)
-
-
-def _in_place(poses: Floats, start: Floats, rows: Floats, closures: list[LoopClosure]) -> Floats:
-    """(n, 3) corrected poses of path `rows`, moved as one to where the path was believed to be as
-    far as earlier corrections reach; without any, to where it was corrected from, its `start`.
-    """
-    corrected_until_ns = max((each.to_ns for each in closures if each.accepted), default=NEVER_NS)
-    is_settled = rows[:, STAMP] * 1e9 <= corrected_until_ns
-    before = rows[:, POSE]
-    if not is_settled.any():
-        is_settled[:] = True
-        before = start
-
-    motion = motion_onto(poses[is_settled, :2], before[is_settled, :2])
-    positions_m = transform_from(motion, poses[:, :2])
-    return np.column_stack([positions_m, wrap_angle(poses[:, 2] + motion[2])])

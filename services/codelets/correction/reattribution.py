@@ -66,7 +66,26 @@ def observations_left(
             moved[number, node.landmark].append(row)
 
     for (number, landmark), added in sorted(moved.items()):
-        operations += _added(graph, number, landmark, np.array(added))
+        rows = np.array(added)
+        before = graph.get(Observations, observations_id(number, landmark))
+        if before is not None:
+            rows = np.vstack([before.rows.numpy(), rows])
+
+        _, first = np.unique(rows[:, ObservationColumn.STAMP_S], return_index=True)
+        if before is not None and len(first) == len(before.rows.numpy()):
+            continue
+
+        after = Observations(
+            id=observations_id(number, landmark),
+            base_level=1.0,
+            number=number,
+            landmark=landmark,
+            rows=Matrix.of(rows[first]),
+        )
+        operations.append(after)
+        if before is None:
+            operations += links_of(after)
+
     return operations
 
 
@@ -102,25 +121,3 @@ def closures_left(closures: Sequence[LoopClosure], ends: Views, joined: Joining)
             operations.append(after)
 
     return operations
-
-
-def _added(graph: Graph, number: int, landmark: str, rows: Floats) -> list[Operation]:
-    """The observations of a landmark along segment `number` with those of (n, 6) `rows` that are
-    from places which it was not observed from.
-    """
-    before = graph.get(Observations, observations_id(number, landmark))
-    if before is not None:
-        rows = np.vstack([before.rows.numpy(), rows])
-
-    _, first = np.unique(rows[:, ObservationColumn.STAMP_S], return_index=True)
-    if before is not None and len(first) == len(before.rows.numpy()):
-        return []
-
-    after = Observations(
-        id=observations_id(number, landmark),
-        base_level=1.0,
-        number=number,
-        landmark=landmark,
-        rows=Matrix.of(rows[first]),
-    )
-    return [after] if before is not None else [after, *links_of(after)]

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable
 
 import msgspec
 import numpy as np
@@ -40,12 +39,23 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
     positions_m = np.array([(node.x_m, node.y_m) for node in known]).reshape(-1, 2)
     here_m = transform_from(pose, positions_m).tolist()
 
-    # The label here of each: the one it is matched with, or that of the object of its look that
-    # stands there too; empty if there is none.
+    # The label here of each: the one it is matched with, or that of the nearest object of its look
+    # that stands there too; empty if there is none.
     matched = {label for label in recalled.matched if label}
     labels = []
     for number, match in enumerate(recalled.matched):
-        label = match or _standing_there(recalled, number, known, here_m, matched)
+        label = match
+        look = look_of(recalled.labels[number])
+        at_m = recalled.objects.numpy()[number, POSITION]
+        nearest_m = APART_M
+        candidates = () if match else zip(known, here_m, strict=True)
+        for node, there_m in candidates:
+            away_m = math.dist(there_m, at_m)
+            is_free = look_of(node.label) == look and node.label not in matched
+            if is_free and away_m <= nearest_m:
+                label = node.label
+                nearest_m = away_m
+
         matched.add(label)
         labels.append(label)
 
@@ -85,27 +95,3 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
         operations += [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
 
     return operations
-
-
-def _standing_there(
-    recalled: Recollection,
-    number: int,
-    known: list[Object],
-    here_m: list[list[float]],
-    taken: Iterable[str],
-) -> str:
-    """The label of the nearest object of a recalled one's look that is not `taken`."""
-    look = look_of(recalled.labels[number])
-    at_m = recalled.objects.numpy()[number, POSITION]
-    found = ""
-    nearest_m = APART_M
-    for node, there_m in zip(known, here_m, strict=True):
-        if look_of(node.label) != look or node.label in taken:
-            continue
-
-        away_m = math.dist(there_m, at_m)
-        if away_m <= nearest_m:
-            found = node.label
-            nearest_m = away_m
-
-    return found

@@ -25,8 +25,20 @@ def replay_of(rows: Floats, poses: Floats, loops: Constraints) -> Replay:
     before_m = before[:, POSE][:, :2]
     after_m = poses[first:][::-1, :2]
 
+    # Place cells whose synapse changes most, numbered from the newest place on: neighbours along
+    # the path, and those of one place on different passes.
+    cells = np.arange(len(after_m))
+    changing = [np.column_stack([cells[:-1], cells[1:]])]
+    newest = len(rows) - 1
+    for i, j in zip(loops.i.tolist(), loops.j.tolist(), strict=True):
+        newer, older = newest - j, newest - i
+        distance_m = np.hypot(*(after_m - after_m[older]).T)
+        near = np.flatnonzero(distance_m < 1 / DECAY_PER_M)
+        of_newer_pass = near[np.abs(near - newer) < np.abs(near - older)]
+        changing.append(np.column_stack([of_newer_pass, np.full(len(of_newer_pass), older)]))
+
     stamps_ns = np.rint(before[:, STAMP] * 1e9)
-    pairs = _pairs(after_m, loops, len(rows))
+    pairs = np.unique(np.vstack(changing), axis=0)
     strengths_before = _strengths(before_m, pairs)
     strengths_after = _strengths(after_m, pairs)
     return Replay(
@@ -48,23 +60,3 @@ def _strengths(positions_m: Floats, pairs: Indices) -> Floats:
     apart_m = positions_m[pairs[:, 0]] - positions_m[pairs[:, 1]]
     strengths: Floats = np.exp(-DECAY_PER_M * np.hypot(*apart_m.T))
     return strengths
-
-
-def _pairs(fields_m: Floats, loops: Constraints, places: int) -> Indices:
-    """(m, 2): place cells whose synapse changes most, those of one place on different passes, and
-    neighbours along the path.
-
-    Cells are numbered from the newest of the path's `places` on.
-    """
-    cells = np.arange(len(fields_m))
-    pairs = [np.column_stack([cells[:-1], cells[1:]])]
-
-    newest = places - 1
-    for i, j in zip(loops.i.tolist(), loops.j.tolist(), strict=True):
-        newer, older = newest - j, newest - i
-        distance_m = np.hypot(*(fields_m - fields_m[older]).T)
-        near = np.flatnonzero(distance_m < 1 / DECAY_PER_M)
-        of_newer_pass = near[np.abs(near - newer) < np.abs(near - older)]
-        pairs.append(np.column_stack([of_newer_pass, np.full(len(of_newer_pass), older)]))
-
-    return np.unique(np.vstack(pairs), axis=0)

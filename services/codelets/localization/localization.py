@@ -172,7 +172,10 @@ def correct(
     has kept. Stages cannot follow a heading that may be any: then the landmarks determine which
     headings are tried.
     """
-    if seen.has_bearing.any() and _is_heading_unknown(past.samples[:, 2]):
+    headings_rad = past.samples[:, 2]
+    length = np.hypot(np.cos(headings_rad).mean(), np.sin(headings_rad).mean())
+    is_heading_known = np.ptp(headings_rad) <= TURNED_RAD or length >= ALIKE
+    if seen.has_bearing.any() and not is_heading_known:
         return Estimate(relocalize_heading(past.samples, seen, rng), 0.0)
 
     compared = compare(past.samples, seen)
@@ -201,16 +204,6 @@ def correct(
         compared = compare(samples, seen)
 
     return Estimate(kept, share)
-
-
-def _is_heading_unknown(headings_rad: Floats) -> bool:
-    """Return whether the headings (n,) are so far apart that nearly any may be the agent's."""
-    if np.ptp(headings_rad) <= TURNED_RAD:
-        return False
-
-    mean_x = np.cos(headings_rad).mean()
-    mean_y = np.sin(headings_rad).mean()
-    return bool(np.hypot(mean_x, mean_y) < ALIKE)
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:

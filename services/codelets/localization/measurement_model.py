@@ -98,20 +98,7 @@ def compare(samples: Floats, seen: Measurements) -> Comparison:
     bearing_var = seen.bearing_sd_rad**2 + tangential / squared_m2
     range_var = seen.range_sd_m**2 + radial
 
-    squared = _squared(samples, seen, bearing_var, range_var)
-    density = np.exp(np.minimum(squared, MAX_MAHALANOBIS2) / -2)
-
-    # A landmark of uncertain position is seen with a flatter density.
-    peak = np.where(seen.has_bearing, seen.bearing_sd_rad**2 / bearing_var, 1.0)
-    peak *= np.where(seen.has_range, seen.range_sd_m**2 / range_var, 1.0)
-    density *= _single(np.sqrt(peak))[:, None]
-    return Comparison(squared, density)
-
-
-def _squared(
-    samples: Floats, seen: Measurements, bearing_var: Floats, range_var: Floats
-) -> Singles:
-    """(k, n): squared Mahalanobis distances, computed in place, for they take most of an update."""
+    # Squared Mahalanobis distances, computed in place, for they take most of an update.
     east_m = _single(seen.mean_m[:, 0, None] - samples[:, 0])
     north_m = _single(seen.mean_m[:, 1, None] - samples[:, 1])
 
@@ -130,7 +117,14 @@ def _squared(
     distance *= distance
     distance *= _single(seen.has_range / range_var)[:, None]
 
-    return np.add(bearing, distance, out=distance)
+    squared = np.add(bearing, distance, out=distance)
+    density = np.exp(np.minimum(squared, MAX_MAHALANOBIS2) / -2)
+
+    # A landmark of uncertain position is seen with a flatter density.
+    peak = np.where(seen.has_bearing, seen.bearing_sd_rad**2 / bearing_var, 1.0)
+    peak *= np.where(seen.has_range, seen.range_sd_m**2 / range_var, 1.0)
+    density *= _single(np.sqrt(peak))[:, None]
+    return Comparison(squared, density)
 
 
 def _single(numbers: Floats) -> Singles:

@@ -13,7 +13,6 @@ import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.estimation.pairwise_consistency import MIN_AGREEING
-from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
@@ -163,9 +162,19 @@ def _closure_by_landmark(
     numbers = sorted({node.number for node in observations})
     rows = rows_of(nodes_of(graph, PathSegment, [segment_id(number) for number in numbers]))
     seen = Sightings.of(observations, rows[:, STAMP])
-    there = _clearest(seen, rows, before_ns)
+    known = np.flatnonzero(rows[seen.place, STAMP] <= before_ns * 1e-9 + 1e-6)
+    if len(known) < MIN_AGREEING:
+        return None
+
+    # Those up to then that most others agree with, from the nearest on: on one pass by, they lead
+    # to the same place by path integration alone.
+    where_m = transform_from(rows[seen.place[known], ODOMETRY], seen.where_m[known])
+    offset_m = where_m[:, None] - where_m
+    is_near = np.hypot(offset_m[..., 0], offset_m[..., 1]) <= SAME_M
+    there = known[is_near[is_near.sum(axis=1).argmax()]]
     if len(there) < MIN_AGREEING:
         return None
+    there = there[np.argsort(np.hypot(*seen.where_m[there].T), kind="stable")]
 
     # It is as uncertain as the percept now and the observation then.
     chosen = int(there[view % len(there)])
@@ -188,24 +197,3 @@ def _closure_by_landmark(
         before_ns=before_ns,
         view=view + 1,
     )
-
-
-def _clearest(seen: Sightings, rows: Floats, before_ns: int) -> Indices:
-    """The sightings of a landmark that most others agree with, up to `before_ns`, those from
-    nearest first.
-
-    On one pass by, they lead to the same place by path integration alone.
-    """
-    until_s = before_ns * 1e-9 + 1e-6
-    known = np.flatnonzero(rows[seen.place, STAMP] <= until_s)
-    if not len(known):
-        return known
-
-    where_m = transform_from(rows[seen.place[known], ODOMETRY], seen.where_m[known])
-    offset_m = where_m[:, None] - where_m
-    is_near = np.hypot(offset_m[..., 0], offset_m[..., 1]) <= SAME_M
-    chosen = known[is_near[is_near.sum(axis=1).argmax()]]
-
-    distance_m = np.hypot(*seen.where_m[chosen].T)
-    order: Indices = chosen[np.argsort(distance_m, kind="stable")]
-    return order

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
+from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, WEIGHT_COLUMNS, Extent
 from cogmap.schemas.nodes import ROOT_MAP
@@ -41,26 +41,24 @@ class CutLinks(NamedTuple):
         Links within `clear_m` of its ends, (k, 2), do not count: they are of what stands there.
         Outside the rectangle nothing is known to be cut.
         """
+        # The places that lines pass, in order, and the steps from each to a neighbour.
         cells = lines_m / self.cell_m - np.array(self.origin)
-        steps = _steps_along(cells)
-        is_cut = self._are_cut(steps.before, steps.after)
+        along = cells[:, 1] - cells[:, 0]
+        parts = np.ceil(STEPS_A_CELL * np.hypot(*along.T)).astype(np.int64) + 1
+        line = np.repeat(np.arange(len(parts)), parts + 1)
+        first = np.cumsum(parts + 1) - (parts + 1)
+        share = (np.arange(len(line)) - first[line]) / parts[line]
+        places = np.rint(cells[line, 0] + share[:, None] * along[line]).astype(np.int64)
 
-        if clear_m is not None:
-            length_m = np.hypot(*(lines_m[:, 1] - lines_m[:, 0]).T)[steps.line]
-            along_m = steps.share * length_m
-            is_cut &= along_m > clear_m[steps.line, 0]
-            is_cut &= length_m - along_m > clear_m[steps.line, 1]
+        is_step = (line[1:] == line[:-1]) & (places[1:] != places[:-1]).any(axis=1)
+        step_line = line[1:][is_step]
+        before = places[:-1][is_step]
+        after = places[1:][is_step]
 
-        is_crossed = np.zeros(len(lines_m), bool)
-        is_crossed[steps.line[is_cut]] = True
-        return is_crossed
-
-    def _are_cut(self, before: Indices, after: Indices) -> Booleans:
-        """(s,): if the link between two neighbouring places, (s, 2) indices, is cut."""
         upper = self.weights.shape[1:]
         is_known = np.ones(len(before), bool)
-        for places in (before, after):
-            is_known &= ((places >= 0) & (places < upper)).all(axis=1)
+        for ends in (before, after):
+            is_known &= ((ends >= 0) & (ends < upper)).all(axis=1)
 
         offset = after - before
         is_cut = np.zeros(len(before), bool)
@@ -70,36 +68,12 @@ class CutLinks(NamedTuple):
                 i, j = owner[chosen].T
                 is_cut[chosen] = self.weights[link, i, j] < CUT_BELOW
 
-        return is_cut
+        if clear_m is not None:
+            length_m = np.hypot(*(lines_m[:, 1] - lines_m[:, 0]).T)[step_line]
+            along_m = ((share[1:] + share[:-1]) / 2)[is_step] * length_m
+            is_cut &= along_m > clear_m[step_line, 0]
+            is_cut &= length_m - along_m > clear_m[step_line, 1]
 
-
-class _Steps(NamedTuple):
-    """Steps from one place to a neighbour along lines: the line, (s,), the places before and after,
-    (s, 2), and how far along the line that is, as a share, (s,).
-    """
-
-    line: Indices
-    before: Indices
-    after: Indices
-    share: Floats
-
-
-def _steps_along(cells: Floats) -> _Steps:
-    """The steps from place to place along (k, 2, 2) lines, in cells."""
-    along = cells[:, 1] - cells[:, 0]
-    parts = np.ceil(STEPS_A_CELL * np.hypot(*along.T)).astype(np.int64) + 1
-    line = np.repeat(np.arange(len(parts)), parts + 1)
-    first = np.cumsum(parts + 1) - (parts + 1)
-    share = (np.arange(len(line)) - first[line]) / parts[line]
-
-    points = cells[line, 0] + share[:, None] * along[line]
-    places = np.rint(points).astype(np.int64)
-
-    is_step = (line[1:] == line[:-1]) & (places[1:] != places[:-1]).any(axis=1)
-    middle = (share[1:] + share[:-1]) / 2
-    return _Steps(
-        line=line[1:][is_step],
-        before=places[:-1][is_step],
-        after=places[1:][is_step],
-        share=middle[is_step],
-    )
+        is_crossed = np.zeros(len(lines_m), bool)
+        is_crossed[step_line[is_cut]] = True
+        return is_crossed

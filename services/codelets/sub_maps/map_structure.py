@@ -6,8 +6,6 @@ reads no more of the map than those.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from cogmap.geometry.arrays import Indices
@@ -73,12 +71,26 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
     """The sub-maps around what the task is about, and the links of their objects to them."""
-    scope = _scope(task, graph)
-    numbers = _sorted(scope, graph, config)
+    if task.about:
+        new = [node for node in nodes_of(graph, Object, task.about) if _is_new(node, graph)]
+        moved = nodes_of(graph, Map, task.about)
+        maps = maps_around(sub_maps_of(graph), new, moved, REACH_M)
+    else:
+        new = [node for node in graph.of_kind(Object) if _is_new(node, graph)]
+        moved = []
+        maps = sub_maps_of(graph)
+
+    # The objects of these, those that arrive last, with the numbers of their sub-maps.
+    known = members_of(maps, graph)
+    objects = [*(node for nodes in known.values() for node in nodes), *new]
+    labels = [number for number, nodes in known.items() for _ in nodes]
+    numbers_before = np.array(labels + [NEW] * len(new), np.int64)
+    all_anew = bool(moved) or not task.about
+    numbers = _sorted(objects, numbers_before, graph, config, all_anew=all_anew)
 
     # Sub-maps that are new, or cover another area than before and so have another frame.
     operations: list[Operation] = []
-    positions_m = positions_of(scope.objects)
+    positions_m = positions_of(objects)
     for number in np.unique(numbers).tolist():
         area = area_covered(positions_m[numbers == number])
         before = graph.get(Map, map_id(number))
@@ -88,13 +100,13 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
                 operations.append(DropPlaces(map=before.id))
 
     weights = {}
-    for index in np.flatnonzero(numbers != scope.numbers).tolist():
-        weights[scope.objects[index].id] = {map_id(int(numbers[index])): 1.0}
+    for index in np.flatnonzero(numbers != numbers_before).tolist():
+        weights[objects[index].id] = {map_id(int(numbers[index])): 1.0}
     if weights:
         operations.append(Links(kind=LinkKind.WITHIN, weights=weights))
 
     kept = set(numbers.tolist())
-    operations += [DropNode(id=node.id) for node in scope.maps if number_of(node) not in kept]
+    operations += [DropNode(id=node.id) for node in maps if number_of(node) not in kept]
     return Answer(operations)
 
 
@@ -110,61 +122,32 @@ CODELET = Codelet(
 )
 
 
-class _Scope(NamedTuple):
-    """Sub-maps that may change, the objects in them, with those that arrive last, the number of the
-    sub-map of each, (n,), NEW of those that arrive, and whether all are sorted anew.
-    """
-
-    maps: list[Map]
-    objects: list[Object]
-    numbers: Indices
-    all_anew: bool
-
-
 def _is_new(node: Object, graph: Graph) -> bool:
     sub_map = graph.links.target(node.id, LinkKind.WITHIN)
     is_in_none = sub_map is None or graph.get(Map, sub_map) is None
     return node.map == ROOT_MAP and is_in_none
 
 
-def _scope(task: Task, graph: Graph) -> _Scope:
-    """Return what a task is about, and what that may change."""
-    if task.about:
-        new = [node for node in nodes_of(graph, Object, task.about) if _is_new(node, graph)]
-        moved = nodes_of(graph, Map, task.about)
-        maps = maps_around(sub_maps_of(graph), new, moved, REACH_M)
-    else:
-        new = [node for node in graph.of_kind(Object) if _is_new(node, graph)]
-        moved = []
-        maps = sub_maps_of(graph)
-
-    known = members_of(maps, graph)
-    numbers = [number for number, nodes in known.items() for _ in nodes]
-    objects = [node for nodes in known.values() for node in nodes]
-    return _Scope(
-        maps=maps,
-        objects=[*objects, *new],
-        numbers=np.array(numbers + [NEW] * len(new), np.int64),
-        all_anew=bool(moved) or not task.about,
-    )
-
-
-def _sorted(scope: _Scope, graph: Graph, config: Config) -> Indices:
-    """(n,): the number of the sub-map that each object is in now."""
-    if not scope.objects:
+def _sorted(
+    objects: list[Object], before: Indices, graph: Graph, config: Config, *, all_anew: bool
+) -> Indices:
+    """(n,): the number of the sub-map that each object is in now; `before` (n,) it was in, those
+    that are NEW last.
+    """
+    if not objects:
         return np.zeros(0, np.int64)
 
-    positions_m = positions_of(scope.objects)
-    names = sorted({node.function for node in scope.objects if node.function})
+    positions_m = positions_of(objects)
+    names = sorted({node.function for node in objects if node.function})
     code_of = {name: code for code, name in enumerate(names)}
-    codes = [code_of.get(node.function, NEW) for node in scope.objects]
+    codes = [code_of.get(node.function, NEW) for node in objects]
     functions = np.array(codes, np.int64)
 
     cell_m = graph.cell_m()
-    clear_m = np.array([node.width_m / 2 + cell_m for node in scope.objects])
+    clear_m = np.array([node.width_m / 2 + cell_m for node in objects])
     boundaries = CutLinks.around(graph, positions_m)
 
-    first = len(positions_m) if scope.all_anew else int((scope.numbers != NEW).sum())
+    first = len(positions_m) if all_anew else int((before != NEW).sum())
     sub_maps = SubMaps(
         positions_m[:first],
         functions[:first],
@@ -172,10 +155,10 @@ def _sorted(scope: _Scope, graph: Graph, config: Config) -> Indices:
         config,
         kinds=len(names),
         clear_m=clear_m[:first],
-        labels=scope.numbers[:first],
+        labels=before[:first],
         next_label=next_number(graph),
     )
-    if scope.all_anew:
+    if all_anew:
         sub_maps.settle()
 
     for index in range(first, len(positions_m)):

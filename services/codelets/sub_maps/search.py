@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.arrays import Indices
 from cogmap.services.codelets.sub_maps.merging import Merging
 from cogmap.services.codelets.sub_maps.mixture import Mixture, Scene
 from cogmap.services.codelets.sub_maps.moves import best_moves, gain_most
@@ -57,7 +57,16 @@ def merge_clusters(mixture: Mixture, scene: Scene, labels: Indices, at_least: in
     floor = -np.inf if at_least else MIN_GAIN
     while merging.count > max(1, at_least):
         scores = merging.scores(floor)
-        chosen = _matched(merging.pairs, scores, merging.count)
+        order = np.lexsort((np.arange(len(scores)), -scores))
+        rank = np.empty(len(order), np.int64)
+        rank[order] = np.arange(len(order))
+
+        # The pairs that are the best of both: no cluster is in two.
+        best = np.full(merging.count, len(scores))
+        np.minimum.at(best, merging.pairs[:, 0], rank)
+        np.minimum.at(best, merging.pairs[:, 1], rank)
+        is_best = (best[merging.pairs] == rank[:, None]).all(axis=1)
+        chosen = np.flatnonzero(is_best & np.isfinite(scores))
         if not len(chosen):
             break
 
@@ -67,19 +76,6 @@ def merge_clusters(mixture: Mixture, scene: Scene, labels: Indices, at_least: in
         merging.merge(chosen)
 
     return merging.labels(labels)
-
-
-def _matched(clusters: Indices, scores: Floats, count: int) -> Indices:
-    """(m,): the pairs, of (p, 2), that are the best of both; no cluster is in two."""
-    order = np.lexsort((np.arange(len(scores)), -scores))
-    rank = np.empty(len(order), np.int64)
-    rank[order] = np.arange(len(order))
-
-    best = np.full(count, len(scores))
-    np.minimum.at(best, clusters[:, 0], rank)
-    np.minimum.at(best, clusters[:, 1], rank)
-    is_best = (best[clusters] == rank[:, None]).all(axis=1)
-    return np.flatnonzero(is_best & np.isfinite(scores))
 
 
 def move_objects(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
