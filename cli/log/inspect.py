@@ -76,7 +76,14 @@ def cat(
     later = (record for record in chosen if record.log_time_ns >= start_ns)
     for record in islice(later, number):
         if as_json:
-            click.echo(_as_json(reader, record, full))
+            facts: dict[str, Any] = {"topic": record.topic_name, "log_time_ns": record.log_time_ns}
+            if record.envelope is not None:
+                facts["envelope"] = to_jsonable(record.envelope)
+            try:
+                facts["message"] = to_jsonable(reader.message(record), full)
+            except MessageError as error:
+                facts["error"] = str(error)
+            click.echo(msgspec.json.encode(facts).decode())
         else:
             click.echo(_as_text(reader, record, full))
 
@@ -114,17 +121,6 @@ def recover(source: Path, target: Path, as_json: bool) -> None:
         print_json(recovery)
     else:
         report.print_recovery(recovery)
-
-
-def _as_json(reader: LogReader, record: Record, full: bool) -> str:
-    facts: dict[str, Any] = {"topic": record.topic_name, "log_time_ns": record.log_time_ns}
-    if record.envelope is not None:
-        facts["envelope"] = to_jsonable(record.envelope)
-    try:
-        facts["message"] = to_jsonable(reader.message(record), full)
-    except MessageError as error:
-        facts["error"] = str(error)
-    return msgspec.json.encode(facts).decode()
 
 
 def _as_text(reader: LogReader, record: Record, full: bool) -> str:

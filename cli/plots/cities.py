@@ -63,7 +63,21 @@ def figure(maps: Sequence[CityMap], metrics: dict[str, Any]) -> Figure:
         grid = sheet.add_gridspec(2, 1, height_ratios=(1, 2.1))
         errors, sizes = sheet.add_subfigure(grid[0]).subplots(1, 2, width_ratios=(2.2, 1))
         _draw_errors(errors, maps)
-        _draw_growth(sizes, maps, metrics)
+        length = np.array([each.environment.tour_m / 1e3 for each in maps])
+        for method, name in NAMES.items():
+            error = np.array([each.error_km2(method) for each in maps])
+            slope = metrics[f"growth_{name}_km2_per_km"]
+            sizes.plot(length, error, "o", ms=5, color=COLOURS[method], mec="white")
+            ends = np.array([length.min(), length.max()])
+            sizes.plot(
+                ends,
+                error.mean() + slope * (ends - length.mean()),
+                color=COLOURS[method],
+                label=f"{slope:+.2f}/km",
+            )
+        sizes.set_ylim(bottom=0)
+        sizes.legend(frameon=False, fontsize=8, title="km² for a km of tour", title_fontsize=8)
+        describe(sizes, "b   growth with map size", "tour, km", "km²")
 
         panels = sheet.add_subfigure(grid[1]).subplots(3, columns, squeeze=False)
         for column, each in enumerate(chosen):
@@ -108,24 +122,6 @@ def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
     axes.legend(frameon=False, fontsize=7.5, ncols=2, loc="upper left")
     title = "a   error of each map: sum of squared errors of its 8 buildings"
     describe(axes, title, y="km²")
-
-
-def _draw_growth(axes: Axes, maps: Sequence[CityMap], metrics: dict[str, Any]) -> None:
-    length = np.array([each.environment.tour_m / 1e3 for each in maps])
-    for method, name in NAMES.items():
-        error = np.array([each.error_km2(method) for each in maps])
-        slope = metrics[f"growth_{name}_km2_per_km"]
-        axes.plot(length, error, "o", ms=5, color=COLOURS[method], mec="white")
-        ends = np.array([length.min(), length.max()])
-        axes.plot(
-            ends,
-            error.mean() + slope * (ends - length.mean()),
-            color=COLOURS[method],
-            label=f"{slope:+.2f}/km",
-        )
-    axes.set_ylim(bottom=0)
-    axes.legend(frameon=False, fontsize=8, title="km² for a km of tour", title_fontsize=8)
-    describe(axes, "b   growth with map size", "tour, km", "km²")
 
 
 def _draw_maps(column: Sequence[Axes], each: CityMap) -> None:

@@ -73,7 +73,17 @@ def draw_plan(axes: Axes, percepts: Percepts, camera: Calibration) -> None:
     looking up.
     """
     farthest_m = _farthest_m(percepts)
-    _draw_field(axes, camera, farthest_m)
+    far_m = 3 * farthest_m
+    edges = [(camera.cx_px - column) / camera.fx_px for column in (0, camera.width_px - 1)]
+    field = np.array([(0.0, 0.0), *((far_m, far_m * edge) for edge in edges)])
+    field[:, 0] += camera.mount_forward_m
+    axes.add_patch(
+        Polygon(_from_above(field), closed=True, fc=STREET, alpha=0.45, ec="none", zorder=0)
+    )
+    for number in range(1, math.ceil(1.5 * farthest_m / RING_M)):
+        axes.add_patch(
+            Circle((0, 0), number * RING_M, fill=False, ec=KERB, lw=0.7, ls=(0, (3, 3)), zorder=1)
+        )
     for patch in cells(points(percepts.road_m)):
         axes.add_patch(
             Polygon(
@@ -83,7 +93,27 @@ def draw_plan(axes: Axes, percepts: Percepts, camera: Calibration) -> None:
     ends = _from_above(points(percepts.road_boundary_m))
     axes.plot(*ends.T, "o", ms=2.6, mfc=ESTIMATE, mec="white", mew=0.4, zorder=4)
     for percept, colour in zip(percepts.objects, colours_of(percepts.objects), strict=True):
-        _draw_object(axes, percept, colour)
+        middle = _from_above(_position_m(percept)[None])[0]
+        across_m = 4 * percept.range_m * percept.bearing_sd_rad
+        along_m = 4 * percept.range_sd_m
+        turn = math.degrees(percept.bearing_rad)
+        axes.plot([0, middle[0]], [0, middle[1]], color=colour, lw=0.7, alpha=0.55, zorder=2)
+        axes.add_patch(
+            Ellipse(middle.tolist(), across_m, along_m, angle=turn, fc=colour, alpha=0.25, zorder=5)
+        )
+        axes.add_patch(
+            Ellipse(
+                middle.tolist(),
+                across_m,
+                along_m,
+                angle=turn,
+                fill=False,
+                ec=colour,
+                lw=1.2,
+                zorder=6,
+            )
+        )
+        axes.plot(*middle, "o", ms=5, mfc=colour, mec="white", mew=0.8, zorder=7)
     robot = np.array([(1.1, 0.0), (-0.7, 0.7), (-0.3, 0.0), (-0.7, -0.7)]) * max(
         1.0, farthest_m / ROBOT_PER_M
     )
@@ -112,38 +142,6 @@ def name_in_plan(axes: Axes, objects: list[Percept], size: float) -> None:
             Label(spoken(percept.label), x, y + min(2 * percept.range_sd_m, MAX_ABOVE_M), colour)
         )
     place(axes, labels, size)
-
-
-def _draw_field(axes: Axes, camera: Calibration, farthest_m: float) -> None:
-    """What the camera can see, and rings of equal range."""
-    far_m = 3 * farthest_m
-    edges = [(camera.cx_px - column) / camera.fx_px for column in (0, camera.width_px - 1)]
-    field = np.array([(0.0, 0.0), *((far_m, far_m * edge) for edge in edges)])
-    field[:, 0] += camera.mount_forward_m
-    axes.add_patch(
-        Polygon(_from_above(field), closed=True, fc=STREET, alpha=0.45, ec="none", zorder=0)
-    )
-    for number in range(1, math.ceil(1.5 * farthest_m / RING_M)):
-        axes.add_patch(
-            Circle((0, 0), number * RING_M, fill=False, ec=KERB, lw=0.7, ls=(0, (3, 3)), zorder=1)
-        )
-
-
-def _draw_object(axes: Axes, percept: Percept, colour: str) -> None:
-    middle = _from_above(_position_m(percept)[None])[0]
-    across_m = 4 * percept.range_m * percept.bearing_sd_rad
-    along_m = 4 * percept.range_sd_m
-    turn = math.degrees(percept.bearing_rad)
-    axes.plot([0, middle[0]], [0, middle[1]], color=colour, lw=0.7, alpha=0.55, zorder=2)
-    axes.add_patch(
-        Ellipse(middle.tolist(), across_m, along_m, angle=turn, fc=colour, alpha=0.25, zorder=5)
-    )
-    axes.add_patch(
-        Ellipse(
-            middle.tolist(), across_m, along_m, angle=turn, fill=False, ec=colour, lw=1.2, zorder=6
-        )
-    )
-    axes.plot(*middle, "o", ms=5, mfc=colour, mec="white", mew=0.8, zorder=7)
 
 
 def _position_m(percept: Percept) -> Floats:

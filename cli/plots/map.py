@@ -21,6 +21,7 @@ from cogmap.cli.plots.town_layer import CHARGING_MARKER, draw_town
 from cogmap.graph.graph import Graph
 
 MARGIN_M = 5.0
+SCALE_M = 10.0
 DASHED = (0, (4, 2))
 DOTTED = (0, (1, 1.2))
 
@@ -37,31 +38,29 @@ def draw(path: Path, observer: Observer, graph: Graph, metrics: RecordedMetrics)
             draw_town(axes, observer.town)
         layers.draw_road(axes, observer, graph)
         layers.draw_objects(axes, observer, graph)
-        _draw_paths(axes, observer)
+
+        axes.plot(*observer.wheels_path_m.T, color=WHEELS, lw=1.6, ls=DASHED, zorder=8)
+        axes.plot(
+            *observer.true_path_m.T, color=TRUE, lw=3.2, alpha=0.9, solid_capstyle="round", zorder=9
+        )
+        axes.plot(*observer.fused_path_m.T, color=FUSED, lw=1.4, ls=DOTTED, zorder=9.5)
+        axes.plot(*observer.estimated_path_m.T, color=ESTIMATE, lw=1.5, zorder=10)
+
+        if observer.start is not None:
+            axes.plot(
+                observer.start.x_m,
+                observer.start.y_m,
+                "o",
+                ms=9,
+                mfc="white",
+                mec=TRUE,
+                mew=2,
+                zorder=11,
+            )
+
         structure = draw_structure(axes, observer, graph)
         _dress(axes, observer, metrics, structure)
         figure.savefig(path, facecolor=PAPER)
-
-
-def _draw_paths(axes: Axes, observer: Observer) -> None:
-    axes.plot(*observer.wheels_path_m.T, color=WHEELS, lw=1.6, ls=DASHED, zorder=8)
-    axes.plot(
-        *observer.true_path_m.T, color=TRUE, lw=3.2, alpha=0.9, solid_capstyle="round", zorder=9
-    )
-    axes.plot(*observer.fused_path_m.T, color=FUSED, lw=1.4, ls=DOTTED, zorder=9.5)
-    axes.plot(*observer.estimated_path_m.T, color=ESTIMATE, lw=1.5, zorder=10)
-
-    if observer.start is not None:
-        axes.plot(
-            observer.start.x_m,
-            observer.start.y_m,
-            "o",
-            ms=9,
-            mfc="white",
-            mec=TRUE,
-            mew=2,
-            zorder=11,
-        )
 
 
 def _dress(
@@ -88,37 +87,27 @@ def _dress(
         (west, south), (east, north) = every.min(axis=0) - MARGIN_M, every.max(axis=0) + MARGIN_M
         axes.set_xlim(west, east)
         axes.set_ylim(south, north)
-        _draw_scale(axes, west + 2.0, south + 2.0)
+        axes.plot(
+            [west + 2.0, west + 2.0 + SCALE_M],
+            [south + 2.0, south + 2.0],
+            color=INK,
+            lw=3,
+            solid_capstyle="butt",
+            zorder=12,
+        )
+        axes.text(
+            west + 2.0 + SCALE_M / 2,
+            south + 2.0 + 0.7,
+            f"{SCALE_M:g} m",
+            ha="center",
+            color=INK,
+            zorder=12,
+        )
     axes.set_aspect("equal")
     axes.tick_params(colors=FAINT, length=3)
     axes.set_xlabel("x, metres east", color=FAINT)
     axes.set_ylabel("y, metres north", color=FAINT)
-    _title(axes, metrics)
-    axes.legend(
-        handles=[*_legend(), *_charging_legend(metrics), *structure],
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.06),
-        ncols=4,
-        frameon=False,
-        fontsize=8.5,
-    )
 
-
-def _draw_scale(axes: Axes, west_m: float, south_m: float, length_m: float = 10.0) -> None:
-    axes.plot(
-        [west_m, west_m + length_m],
-        [south_m, south_m],
-        color=INK,
-        lw=3,
-        solid_capstyle="butt",
-        zorder=12,
-    )
-    axes.text(
-        west_m + length_m / 2, south_m + 0.7, f"{length_m:g} m", ha="center", color=INK, zorder=12
-    )
-
-
-def _title(axes: Axes, metrics: RecordedMetrics) -> None:
     driven = (
         f"Town {metrics.seed}, driven through for {metrics.distance_m:.0f} m "
         f"in {metrics.drive_s:.0f} s"
@@ -139,6 +128,14 @@ def _title(axes: Axes, metrics: RecordedMetrics) -> None:
         color=INK,
         va="bottom",
         linespacing=1.5,
+    )
+    axes.legend(
+        handles=[*_legend(), *_charging_legend(metrics), *structure],
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.06),
+        ncols=4,
+        frameon=False,
+        fontsize=8.5,
     )
 
 

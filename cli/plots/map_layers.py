@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Ellipse
-from matplotlib.transforms import Affine2D, Transform
+from matplotlib.transforms import Affine2D
 
 from cogmap.cli.launch.drive_metrics import objects, position_m
 from cogmap.cli.launch.observer import Observer
@@ -16,15 +16,11 @@ from cogmap.schemas.nodes import ROOT_MAP, TILE_SIDE, Object, PlaceColumn
 from cogmap.schemas.sensing import Pose
 
 
-def _agent_frame(axes: Axes, frame: Pose | None) -> Transform:
-    pose = frame or Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
-    return Affine2D().rotate(pose.heading_rad).translate(pose.x_m, pose.y_m) + axes.transData
-
-
 def draw_road(axes: Axes, observer: Observer, graph: Graph) -> None:
     """The place nodes' road column, cell by cell."""
     red, green, blue = to_rgb(ROAD)
-    frame = _agent_frame(axes, observer.map_frame)
+    pose = observer.map_frame or Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
+    frame = Affine2D().rotate(pose.heading_rad).translate(pose.x_m, pose.y_m) + axes.transData
     cell_m = graph.cell_m()
     side_m = TILE_SIDE * cell_m
     for (_, x, y), tile in graph.places.of_map(ROOT_MAP):

@@ -86,21 +86,16 @@ def _draw_sub_maps(axes: Axes, observer: Observer, graph: Graph) -> bool:
             continue
 
         colour = SEVERAL[number % len(SEVERAL)]
-        road_m = observer.to_world(_road_m(sub_map, graph))
+        cells, shares = graph.places.written_cells(sub_map.id, PlaceColumn.ROAD)
+        pose = np.array([sub_map.x_m, sub_map.y_m, sub_map.heading_rad])
+        road = cells[shares >= ROAD_FROM].astype(np.float64)
+        road_m = observer.to_world(transform_from(pose, sub_map.cell_m * road))
         axes.plot(*road_m.T, ".", color=colour, ms=2.0, alpha=0.8, zorder=3.2)
         where_m = observer.to_world(corners_m)
         axes.add_patch(Polygon(where_m, fc=colour, ec=colour, alpha=0.16, lw=2, zorder=1.5))
         has_any = True
 
     return has_any
-
-
-def _road_m(sub_map: Map, graph: Graph) -> Floats:
-    """(n, 2): where on the root map the place nodes of a sub-map are that are road."""
-    cells, shares = graph.places.written_cells(sub_map.id, PlaceColumn.ROAD)
-    pose = np.array([sub_map.x_m, sub_map.y_m, sub_map.heading_rad])
-    road = cells[shares >= ROAD_FROM].astype(np.float64)
-    return transform_from(pose, sub_map.cell_m * road)
 
 
 def _hull_m(points_m: Floats) -> Floats | None:

@@ -136,7 +136,14 @@ def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
             percent.append(100 * np.mean(means))
         axes.plot(sizes, percent, "o-", ms=4, color=style.colour, label=f"ours, {style.label}")
 
-    _draw_published(axes)
+    drawn_percent = {size: 100 * share for size, share in published.DRAWN_HUMAN.items()}
+    for values, marker, colour, whose in (
+        (drawn_percent, "s", PEOPLE, "people, drawn problems, published"),
+        (published.HUMAN_PERCENT, "^", PEOPLE, "people, Madl et al. 2013*"),
+        (published.MODEL_PERCENT, "^", PUBLISHED, "their model*"),
+    ):
+        published_sizes = list(values)
+        axes.plot(published_sizes, list(values.values()), marker, ms=5, color=colour, label=whose)
     axes.set_xscale("log")
     axes.set_xticks(TICKS, [str(size) for size in TICKS])
     axes.minorticks_off()
@@ -149,18 +156,6 @@ def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
         title_fontsize=7,
     )
     describe(axes, "e   drawn at random, by number of goals", "goals", "% above the shortest")
-
-
-def _draw_published(axes: Axes) -> None:
-    """What is published of other problems of the same sizes."""
-    percent = {size: 100 * share for size, share in published.DRAWN_HUMAN.items()}
-    for values, marker, colour, label in (
-        (percent, "s", PEOPLE, "people, drawn problems, published"),
-        (published.HUMAN_PERCENT, "^", PEOPLE, "people, Madl et al. 2013*"),
-        (published.MODEL_PERCENT, "^", PUBLISHED, "their model*"),
-    ):
-        sizes = list(values)
-        axes.plot(sizes, list(values.values()), marker, ms=5, color=colour, label=label)
 
 
 def _draw_people(axes: Axes, human: Sequence[Planned]) -> None:

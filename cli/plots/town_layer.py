@@ -32,7 +32,9 @@ def draw_town(axes: Axes, town: TrueTown) -> None:
     """Streets, obstacles and buildings, those of one district in one tint, and what is closed."""
     for wider_m, colour, order in ((1.0, KERB, 1.0), (0.0, STREET, 1.1)):
         for street in town.streets:
-            _draw_street(axes, street, wider_m, colour, order)
+            line_m = np.array(street.line_m)
+            for start_m, end_m in pairwise(line_m):
+                _draw_band(axes, (start_m, end_m), street.width_m + wider_m, colour, order)
 
     for obstacle in town.obstacles:
         _draw_obstacle(axes, obstacle)
@@ -56,22 +58,12 @@ def _tints(town: TrueTown) -> dict[str, Colour]:
     districts = {building.district for building in town.buildings} - {""}
     for number, district in enumerate(sorted(districts)):
         colour = SEVERAL[number % len(SEVERAL)]
-        tints[district] = _mixed(HOUSE, colour, DISTRICT_SHARE)
+        house, tint = np.array(to_rgb(HOUSE)), np.array(to_rgb(colour))
+        levels = (1 - DISTRICT_SHARE) * house + DISTRICT_SHARE * tint
+        red, green, blue = levels.tolist()
+        tints[district] = red, green, blue
 
     return tints
-
-
-def _mixed(one: str, other: str, share: float) -> Colour:
-    """A colour with a share of another in it."""
-    levels = (1 - share) * np.array(to_rgb(one)) + share * np.array(to_rgb(other))
-    red, green, blue = levels.tolist()
-    return red, green, blue
-
-
-def _draw_street(axes: Axes, street: Street, wider_m: float, colour: str, order: float) -> None:
-    line_m = np.array(street.line_m)
-    for start_m, end_m in pairwise(line_m):
-        _draw_band(axes, (start_m, end_m), street.width_m + wider_m, colour, order)
 
 
 def _draw_band(

@@ -71,7 +71,9 @@ def _unknown(given: Any, parsed: Any, where: str) -> str | None:
     if isinstance(given, dict) and isinstance(parsed, dict):
         for key in given:
             if key not in parsed:
-                return _no_field(key, list(parsed), where)
+                place = where.lstrip(".") or "the top"
+                hint = did_you_mean(key, list(parsed), f"there are {', '.join(parsed)}")
+                return f"no field {key!r} at {place}: {hint}"
 
     for part, parsed_part, place in _parts(given, parsed, where):
         found = _unknown(part, parsed_part, place)
@@ -87,9 +89,3 @@ def _parts(given: Any, parsed: Any, where: str) -> Iterator[tuple[Any, Any, str]
     elif isinstance(given, dict) and isinstance(parsed, dict):
         for key, part in given.items():
             yield part, parsed[key], f"{where}.{key}"
-
-
-def _no_field(key: str, fields: list[str], where: str) -> str:
-    place = where.lstrip(".") or "the top"
-    hint = did_you_mean(key, fields, f"there are {', '.join(fields)}")
-    return f"no field {key!r} at {place}: {hint}"

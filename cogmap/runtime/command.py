@@ -18,8 +18,9 @@ def run_command(command: click.Command, name: str, called: str | None = None) ->
     """Run `command`, as `called` in its help; `name` comes before the sentence of an error.
 
     Ends the process after an error: with 2 if the user can mend it, with 1 for another failure of
-    ours, with 130 after Ctrl-C; with 1, as click does, if the reader of the output has closed it.
+    ours, with 130 after Ctrl-C; with 0 if the reader of the output has closed it: it has enough.
     """
+    output = sys.stdout
     try:
         command(standalone_mode=False, prog_name=called)
         if sys.stdout is not None:
@@ -34,7 +35,13 @@ def run_command(command: click.Command, name: str, called: str | None = None) ->
         sys.exit(2 if isinstance(error, UsageError) else 1)
     except BrokenPipeError:
         _discard_output()
-        sys.exit(1)
+        sys.exit(0)
+    except SystemExit:
+        # Click ends with 1 because of a closed pipe, having wrapped the output that failed.
+        if sys.stdout is output:
+            raise
+        _discard_output()
+        sys.exit(0)
     except UnicodeEncodeError as error:
         character = error.object[error.start]
         click.echo(

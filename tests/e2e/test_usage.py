@@ -189,14 +189,15 @@ def test_a_full_disk_and_an_ascii_terminal_are_a_sentence() -> None:
     )
 
 
-def test_a_reader_that_has_seen_enough_gets_no_traceback() -> None:
-    process = start("config")
+@pytest.mark.parametrize("arguments", [("config",), ("log", "cat", str(REFERENCE))])
+def test_a_reader_that_has_seen_enough_gets_no_error(arguments: tuple[str, ...]) -> None:
+    process = start(*arguments)
     assert process.stdout is not None
     process.stdout.close()
     assert process.stderr is not None
 
     assert process.stderr.read() == ""
-    assert process.wait(TIMEOUT_S) == 1
+    assert process.wait(TIMEOUT_S) == 0
 
 
 def wait_for_processes(session: zenoh.Session, names: set[str]) -> None:

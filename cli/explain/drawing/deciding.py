@@ -21,7 +21,7 @@ from cogmap.cli.explain.drawing.lettering import shortened, wrapped
 from cogmap.cli.explain.drawing.robot import Robot
 from cogmap.cli.explain.moment import Moment
 from cogmap.cli.plots.palette import ESTIMATE, FAINT, PLAN, TRUE, WALL, WHEELS
-from cogmap.schemas.cognition import Behaviour, Coalition, Contender, Fate, Rejection
+from cogmap.schemas.cognition import Coalition, Fate, Rejection
 
 
 def coalitions(moment: Moment) -> Box:
@@ -33,7 +33,17 @@ def coalitions(moment: Moment) -> Box:
     ordered = reasons.ranked_contenders(moment.competition.message)
     blocks: list[Block] = []
     for contender in ordered[:MOST]:
-        blocks += _contender(moment, contender, width_in)
+        has_won = contender.fate is Fate.WON
+        colour = ESTIMATE if has_won else WALL
+        name = names.spoken(contender.codelet)
+        title = heading(name, contender.fate.value, width_in, colour if has_won else "")
+        bar = Bar(contender.activation, colour, moment.settings.coalition_above)
+        entered = moment.entered.get(contender.id)
+        about = "" if entered is None else f"{text.since(moment, contender.id)}: "
+        if entered is not None:
+            about += names.brief(entered.coalition)
+        lines = wrapped(about, inner_in(width_in), SMALL, 2)
+        blocks += [title, bar, Words(lines, SMALL, FAINT), BETWEEN]
     blocks += others(len(ordered), width_in)
     if ordered:
         above = moment.settings.coalition_above
@@ -41,20 +51,6 @@ def coalitions(moment: Moment) -> Box:
     else:
         blocks.append(note("none competed", width_in))
     return Box("coalitions", WHEELS, width_in, moment.competition.after_ms, blocks)
-
-
-def _contender(moment: Moment, contender: Contender, width_in: float) -> list[Block]:
-    has_won = contender.fate is Fate.WON
-    colour = ESTIMATE if has_won else WALL
-    name = names.spoken(contender.codelet)
-    title = heading(name, contender.fate.value, width_in, colour if has_won else "")
-    bar = Bar(contender.activation, colour, moment.settings.coalition_above)
-    entered = moment.entered.get(contender.id)
-    about = "" if entered is None else f"{text.since(moment, contender.id)}: "
-    if entered is not None:
-        about += names.brief(entered.coalition)
-    lines = wrapped(about, inner_in(width_in), SMALL, 2)
-    return [title, bar, Words(lines, SMALL, FAINT), BETWEEN]
 
 
 def broadcast(moment: Moment) -> Box:
@@ -101,21 +97,17 @@ def behaviours(moment: Moment) -> Box:
     ordered = reasons.ranked_behaviours(moment.action.message)
     blocks: list[Block] = []
     for behaviour in ordered[:MOST]:
-        blocks += _behaviour(behaviour, width_in)
+        is_chosen = behaviour.rejection is Rejection.NONE
+        colour = PLAN if is_chosen else WALL
+        name = names.spoken(behaviour.scheme)
+        fate = "chosen" if is_chosen else ""
+        title = heading(name, fate, width_in, colour if is_chosen else "")
+        why = wrapped(behaviour.rejection.value, inner_in(width_in), SMALL, 3)
+        blocks += [title, Bar(behaviour.activation, colour), Words(why, SMALL, FAINT), BETWEEN]
     blocks += others(len(ordered), width_in)
     if not ordered:
         blocks.append(heading(names.spoken(moment.action.message.scheme), "", width_in, PLAN))
     return Box("behaviours", PLAN, width_in, moment.action.after_ms, blocks)
-
-
-def _behaviour(behaviour: Behaviour, width_in: float) -> list[Block]:
-    is_chosen = behaviour.rejection is Rejection.NONE
-    colour = PLAN if is_chosen else WALL
-    name = names.spoken(behaviour.scheme)
-    fate = "chosen" if is_chosen else ""
-    title = heading(name, fate, width_in, colour if is_chosen else "")
-    why = wrapped(behaviour.rejection.value, inner_in(width_in), SMALL, 3)
-    return [title, Bar(behaviour.activation, colour), Words(why, SMALL, FAINT), BETWEEN]
 
 
 def command(moment: Moment) -> Box:

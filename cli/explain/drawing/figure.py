@@ -38,9 +38,23 @@ _STYLE: dict[Any, Any] = {**draw.STYLE, "svg.hashsalt": "cogmap", "text.parse_ma
 def figure(moment: Moment, suffix: str) -> bytes:
     """The file, of the kind that `suffix` names. Raises LogError where the view is no image."""
     image = _image(moment)
-    stages = _stages(moment, image)
+    aspect = 0.0 if image is None else image.shape[0] / image.shape[1]
+    stages = [
+        sensing.sensed(moment, aspect),
+        sensing.percepts(moment),
+        sensing.workspace(moment),
+        deciding.coalitions(moment),
+        deciding.broadcast(moment),
+        deciding.behaviours(moment),
+        deciding.command(moment),
+    ]
     width_in = sum(box.width_in for box in stages) + GAP_IN * (len(stages) - 1) + 2 * EDGE_IN
-    why = _why(moment, width_in - 2 * EDGE_IN)
+
+    lines = []
+    for sentences in (reasons.of_competition(moment), reasons.of_action(moment)):
+        lines += wrapped(" ".join(sentences), width_in - 2 * EDGE_IN, SIZE_OF_WHY)
+    why = Words(lines, SIZE_OF_WHY)
+
     inner_in = max(LEAST_IN, *(box.height_in for box in stages))
     box_in = inner_in + HEAD_IN + PAD_IN
     height_in = TITLE_IN + box_in + TIMES_IN + why.height_in + EDGE_IN
@@ -50,7 +64,17 @@ def figure(moment: Moment, suffix: str) -> bytes:
         axes = sheet.add_axes((0, 0, 1, 1))
         axes.set(xlim=(0, width_in), ylim=(0, height_in))
         axes.set_axis_off()
-        _draw_title(axes, moment, width_in, height_in)
+        base_in = height_in - 0.45
+        axes.text(
+            EDGE_IN,
+            base_in,
+            text.headline(moment).capitalize(),
+            color=INK,
+            fontsize=14,
+            fontweight="bold",
+        )
+        note = f"{moment.path.name}; times are since the view was taken"
+        axes.text(width_in - EDGE_IN, base_in, note, ha="right", color=FAINT, fontsize=9)
         _draw_boxes(axes, stages, height_in - TITLE_IN, box_in)
         if image is not None:
             _draw_view(sheet, moment, image, height_in - TITLE_IN - HEAD_IN)
@@ -70,48 +94,23 @@ def _image(moment: Moment) -> Image | None:
     return views.image(view.image, f"{moment.path}, frame {view.frame}")
 
 
-def _stages(moment: Moment, image: Image | None) -> list[Box]:
-    """The boxes, from left to right."""
-    aspect = 0.0 if image is None else image.shape[0] / image.shape[1]
-    return [
-        sensing.sensed(moment, aspect),
-        sensing.percepts(moment),
-        sensing.workspace(moment),
-        deciding.coalitions(moment),
-        deciding.broadcast(moment),
-        deciding.behaviours(moment),
-        deciding.command(moment),
-    ]
-
-
-def _why(moment: Moment, width_in: float) -> Words:
-    """Why that became conscious, and why that was done."""
-    lines = []
-    for sentences in (reasons.of_competition(moment), reasons.of_action(moment)):
-        lines += wrapped(" ".join(sentences), width_in, SIZE_OF_WHY)
-    return Words(lines, SIZE_OF_WHY)
-
-
-def _draw_title(axes: Axes, moment: Moment, width_in: float, height_in: float) -> None:
-    base_in = height_in - 0.45
-    axes.text(
-        EDGE_IN,
-        base_in,
-        text.headline(moment).capitalize(),
-        color=INK,
-        fontsize=14,
-        fontweight="bold",
-    )
-    note = f"{moment.path.name}; times are since the view was taken"
-    axes.text(width_in - EDGE_IN, base_in, note, ha="right", color=FAINT, fontsize=9)
-
-
 def _draw_boxes(axes: Axes, stages: list[Box], top_in: float, box_in: float) -> None:
     """Each box with what stands in it, and an arrow to the next."""
     left_in = EDGE_IN
     for box in stages:
         if box is not stages[0]:
-            _draw_arrow(axes, left_in, top_in - HEAD_IN / 2)
+            y_in = top_in - HEAD_IN / 2
+            arrow = FancyArrowPatch(
+                (left_in - GAP_IN + 0.03, y_in),
+                (left_in - 0.03, y_in),
+                arrowstyle="-|>",
+                mutation_scale=11,
+                color=FAINT,
+                lw=1.4,
+                shrinkA=0,
+                shrinkB=0,
+            )
+            axes.add_patch(arrow)
         _draw_frame(axes, box, left_in, top_in, box_in)
         below_in = top_in - HEAD_IN - box.image_in
         for block in box.blocks:
@@ -143,20 +142,6 @@ def _draw_frame(axes: Axes, box: Box, left_in: float, top_in: float, box_in: flo
         color=FAINT,
         fontsize=8.5,
     )
-
-
-def _draw_arrow(axes: Axes, right_in: float, y_in: float) -> None:
-    arrow = FancyArrowPatch(
-        (right_in - GAP_IN + 0.03, y_in),
-        (right_in - 0.03, y_in),
-        arrowstyle="-|>",
-        mutation_scale=11,
-        color=FAINT,
-        lw=1.4,
-        shrinkA=0,
-        shrinkB=0,
-    )
-    axes.add_patch(arrow)
 
 
 def _draw_times(axes: Axes, stages: list[Box], width_in: float, y_in: float) -> None:

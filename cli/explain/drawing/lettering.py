@@ -39,7 +39,10 @@ def wrapped(text: str, width_in: float, size: float, most: int = 99) -> list[str
             lines.append(word)
 
     if len(lines) > most:
-        lines = [*lines[: most - 1], _with_ellipsis(lines[most - 1], width_in, size)]
+        words = lines[most - 1].split()
+        while len(words) > 1 and width_of(f"{' '.join(words)} {ELLIPSIS}", size) > width_in:
+            words.pop()
+        lines = [*lines[: most - 1], f"{' '.join(words)} {ELLIPSIS}"]
     return [shortened(line, width_in, size) for line in lines]
 
 
@@ -52,11 +55,3 @@ def shortened(text: str, width_in: float, size: float, is_bold: bool = False) ->
     while cut and width_of(cut + ELLIPSIS, size, is_bold) > width_in:
         cut = cut[:-1]
     return cut + ELLIPSIS
-
-
-def _with_ellipsis(line: str, width_in: float, size: float) -> str:
-    """A line that goes on, with as many of its words as have room."""
-    words = line.split()
-    while len(words) > 1 and width_of(f"{' '.join(words)} {ELLIPSIS}", size) > width_in:
-        words.pop()
-    return f"{' '.join(words)} {ELLIPSIS}"

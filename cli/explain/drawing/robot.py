@@ -34,7 +34,18 @@ class Robot:
         centre_in = left_in + width_in / 2
         ahead, _ = self._reach()
         middle_in = top_in - 0.08 - ahead - HALF_ROBOT_IN
-        _draw_body(axes, centre_in, middle_in)
+        body = FancyBboxPatch(
+            (centre_in - 0.2, middle_in - HALF_ROBOT_IN),
+            0.4,
+            2 * HALF_ROBOT_IN,
+            boxstyle="round,pad=0,rounding_size=0.1",
+            fc=STREET,
+            ec=KERB,
+        )
+        axes.add_patch(body)
+        across_in = (centre_in - 0.07, centre_in + 0.07, centre_in)
+        along_in = (middle_in + 0.08, middle_in + 0.08, middle_in + 0.18)
+        axes.fill(across_in, along_in, color=FAINT, lw=0)
         for side, speed_rad_s in ((-1, self.left_rad_s), (1, self.right_rad_s)):
             x_in = centre_in + 0.31 * side
             self._draw_wheel(axes, x_in, middle_in, speed_rad_s)
@@ -78,19 +89,3 @@ class Robot:
 def _arrow_in(speed_rad_s: float) -> float:
     """How long the arrow of a wheel is, negative backwards."""
     return max(-1.0, min(1.0, speed_rad_s / FASTEST_RAD_S)) * ARROW_IN
-
-
-def _draw_body(axes: Axes, centre_in: float, middle_in: float) -> None:
-    """What is between the wheels, and where its front is."""
-    body = FancyBboxPatch(
-        (centre_in - 0.2, middle_in - HALF_ROBOT_IN),
-        0.4,
-        2 * HALF_ROBOT_IN,
-        boxstyle="round,pad=0,rounding_size=0.1",
-        fc=STREET,
-        ec=KERB,
-    )
-    axes.add_patch(body)
-    across_in = (centre_in - 0.07, centre_in + 0.07, centre_in)
-    along_in = (middle_in + 0.08, middle_in + 0.08, middle_in + 0.18)
-    axes.fill(across_in, along_in, color=FAINT, lw=0)

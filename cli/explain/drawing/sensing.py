@@ -19,7 +19,6 @@ from cogmap.cli.explain.drawing.lettering import wrapped
 from cogmap.cli.explain.moment import Moment
 from cogmap.cli.plots import draw
 from cogmap.cli.plots.palette import FAINT, FUSED, OBJECT, TRUE
-from cogmap.schemas.sensing import Percept
 
 SENSED_IN = 2.3
 
@@ -52,20 +51,16 @@ def percepts(moment: Moment) -> Box:
     coloured.sort(key=lambda each: -each[0].activation)
     blocks: list[Block] = []
     for percept, colour in coloured[:MOST]:
-        blocks += _percept(percept, colour, width_in)
+        label = heading(names.spoken(percept.label), "", width_in)
+        lines = [names.of_percept(percept)]
+        if percept.feelings:
+            lines += wrapped(names.of_feelings(percept), inner_in(width_in), SMALL, 2)
+        where = Words(lines, SMALL, FAINT)
+        blocks += [label, Bar(percept.activation, colour), where, BETWEEN]
     blocks += others(len(coloured), width_in)
     if not coloured:
         blocks.append(note("nothing recognised", width_in))
     return Box("percepts", OBJECT, width_in, moment.percepts.after_ms, blocks)
-
-
-def _percept(percept: Percept, colour: str, width_in: float) -> list[Block]:
-    label = heading(names.spoken(percept.label), "", width_in)
-    lines = [names.of_percept(percept)]
-    if percept.feelings:
-        lines += wrapped(names.of_feelings(percept), inner_in(width_in), SMALL, 2)
-    where = Words(lines, SMALL, FAINT)
-    return [label, Bar(percept.activation, colour), where, BETWEEN]
 
 
 def workspace(moment: Moment) -> Box:
