@@ -20,8 +20,8 @@ from cogmap.schemas.array import Matrix
 from cogmap.schemas.memory import StoredObjects
 from cogmap.schemas.nodes import TILE_SIDE, Object, individual_label, object_id
 from cogmap.services.memory.maps import RememberedMap
-from cogmap.services.memory.passing import Way
 from cogmap.services.memory.recall import cues, recalled
+from cogmap.services.memory.sequence_cue import Way
 
 TOWNS = 4
 CROSSINGS = 4

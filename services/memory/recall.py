@@ -13,7 +13,7 @@ from cogmap.geometry.se2 import transform_from
 from cogmap.schemas.nodes import TILE_SIDE, Object, look_of
 from cogmap.services.memory.maps import RememberedMap
 from cogmap.services.memory.matching import NOWHERE, Landmarks, best_matches
-from cogmap.services.memory.passing import MATCH_WITHIN_M, MIN_SHARE, Way, is_as_passed
+from cogmap.services.memory.sequence_cue import MATCH_WITHIN_M, MIN_SHARE, Way, is_as_passed
 
 MAX_CUES = 24
 """So many objects, the nearest to the agent, cue a recall."""

@@ -18,9 +18,9 @@ from cogmap.services.memory.config import MIN_SIGHTINGS, Config
 from cogmap.services.memory.maps import RememberedMap, RememberedMaps
 from cogmap.services.memory.objects.cueing import ObjectCues
 from cogmap.services.memory.objects.forgotten import ForgottenObjects
-from cogmap.services.memory.passing import way_of
 from cogmap.services.memory.recall import cues, recalled
 from cogmap.services.memory.recollection import recollection
+from cogmap.services.memory.sequence_cue import way_of
 from cogmap.services.memory.storing import ChangedPlaces, Changes, stored_objects, stored_tree
 
 

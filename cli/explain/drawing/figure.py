@@ -27,7 +27,7 @@ TITLE_IN = 0.75
 HEAD_IN = 0.42
 TIMES_IN = 0.65
 STRIP_IN = 0.09
-LEAST_IN = 2.6
+MIN_HEIGHT_IN = 2.6
 DPI = 120
 SIZE_OF_WHY = 9.5
 # Without the time of day and random names in it, the same log gives the same bytes.
@@ -55,7 +55,7 @@ def figure(moment: Moment, suffix: str) -> bytes:
         lines += wrapped(" ".join(sentences), width_in - 2 * EDGE_IN, SIZE_OF_WHY)
     why = Words(lines, SIZE_OF_WHY)
 
-    inner_in = max(LEAST_IN, *(box.height_in for box in stages))
+    inner_in = max(MIN_HEIGHT_IN, *(box.height_in for box in stages))
     box_in = inner_in + HEAD_IN + PAD_IN
     height_in = TITLE_IN + box_in + TIMES_IN + why.height_in + EDGE_IN
 

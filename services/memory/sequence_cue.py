@@ -1,4 +1,4 @@
-"""Whether what was passed on the way here is what a stored map has along it. Pure.
+"""A cue to a stored map: what was passed on the way here is what it has along that way. Pure.
 
 Objects here that stand as on a stored map say nothing of what that map has and is not here. Along
 the way that was driven, all that it has must have been seen.

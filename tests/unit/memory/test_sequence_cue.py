@@ -19,8 +19,8 @@ from cogmap.schemas.nodes import (
     segment_id,
 )
 from cogmap.services.memory.maps import RememberedMap
-from cogmap.services.memory.passing import Way, way_of
 from cogmap.services.memory.recall import Recalled, recalled
+from cogmap.services.memory.sequence_cue import Way, way_of
 
 POSE = np.array([30.0, -10.0, 0.7])
 STREET_M = np.column_stack([np.arange(0.0, 100.0), np.zeros(100)])
