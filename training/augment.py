@@ -144,7 +144,13 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
         image = np.asarray(image + (image - grey) * added, np.float32)
 
     if how.backlit_share and rng.random() < how.backlit_share:
-        image *= _backlight(rng)
+        # The ground is darker than the sky, seldom brighter.
+        rows = np.arange(HEIGHT_PX) / HEIGHT_PX
+        horizon = rng.uniform(0.2, 0.55)
+        softness = rng.uniform(0.03, 0.4)
+        below = np.clip((rows - horizon) / softness, 0, 1)
+        light = np.exp(rng.uniform(-1.3, 0.5) * below)
+        image *= np.asarray(light, np.float32)[:, None, None]
 
     if rng.random() < how.shadow_share:
         image *= _shadow(rng)
@@ -162,20 +168,6 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
     noise = rng.standard_normal(image.shape, np.float32)
     image += noise * np.float32(rng.uniform(0, how.noise))
     return np.clip(image, 0, 255).astype(np.uint8)
-
-
-def _backlight(rng: np.random.Generator) -> Singles:
-    """The share of light that each row has, (HEIGHT_PX, 1, 1): the ground is darker than the sky,
-    seldom brighter.
-    """
-    rows = np.arange(HEIGHT_PX) / HEIGHT_PX
-    horizon = rng.uniform(0.2, 0.55)
-    softness = rng.uniform(0.03, 0.4)
-    below = np.clip((rows - horizon) / softness, 0, 1)
-
-    log_light = rng.uniform(-1.3, 0.5)
-    light = np.exp(log_light * below)
-    return np.asarray(light, np.float32)[:, None, None]
 
 
 def _shadow(rng: np.random.Generator) -> Singles:

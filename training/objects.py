@@ -7,7 +7,6 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 
 import cv2
@@ -165,25 +164,13 @@ def train_on_renderings(
 
     export(fitted.net, out, "seen", INPUT_SHAPE, OUTPUT_SHAPES)
     embeddings, log_odds = embed(fitted.net, held_out)
-    found = calibrate(embeddings, log_odds, held_out, _uncalibrated(folder, fitted))
 
-    encoded = msgspec.json.format(msgspec.json.encode(found.prototypes), indent=1)
-    out.with_suffix(".json").write_bytes(encoded + b"\n")
-    return found.metrics
-
-
-def _crops(paths: list[Path], progress: Progress) -> Crops:
-    tracked = progress.track(paths, description="segments")
-    return crops((read(path) for path in tracked), load_segmenter())
-
-
-def _uncalibrated(folder: Path, fitted: Fitted) -> Prototypes:
-    """The prototypes of the catalogue's buildings, without the constants of calibration."""
+    # The prototypes of the catalogue's buildings, without the constants of calibration yet.
     rows = [row for row, name in enumerate(fitted.names) if not name.startswith(INVENTED)]
     taught = [fitted.names[row] for row in rows]
     sizes = sizes_m(folder, fitted.names)
     unit = functional.normalize(fitted.directions).detach().numpy()[rows]
-    return Prototypes(
+    prototypes = Prototypes(
         names=taught,
         directions=unit.astype(float).round(5).tolist(),
         size_m=[sizes[name] for name in taught],
@@ -193,6 +180,16 @@ def _uncalibrated(folder: Path, fitted: Fitted) -> Prototypes:
         novel_unknown=0.0,
         evidence=1.0,
     )
+    found = calibrate(embeddings, log_odds, held_out, prototypes)
+
+    encoded = msgspec.json.format(msgspec.json.encode(found.prototypes), indent=1)
+    out.with_suffix(".json").write_bytes(encoded + b"\n")
+    return found.metrics
+
+
+def _crops(paths: list[Path], progress: Progress) -> Crops:
+    tracked = progress.track(paths, description="segments")
+    return crops((read(path) for path in tracked), load_segmenter())
 
 
 def _fit(known: Crops, rng: np.random.Generator, epochs: int, progress: Progress) -> Fitted:
@@ -208,7 +205,10 @@ def _fit(known: Crops, rng: np.random.Generator, epochs: int, progress: Progress
     optimizer = Optimizer(parameters, steps, MAX_RATE, WEIGHT_DECAY)
     task = progress.add_task("training", total=steps)
 
-    batches = partial(_batches, known, number, steps, rng)
+    def batches() -> Iterator[Batch]:
+        for chosen in shuffled(len(number), BATCH, steps, rng):
+            yield augmented(known.values[chosen], rng), number[chosen], known.whole[chosen]
+
     for values, wanted, whole in prefetch(batches):
         batch = values.contiguous(memory_format=torch.channels_last)
         with torch.autocast("cpu", torch.bfloat16):
@@ -237,13 +237,6 @@ def loss(
 
     shown = torch.stack([building, whole], 1).float()
     return of_labels + functional.binary_cross_entropy_with_logits(log_odds, shown)
-
-
-def _batches(
-    known: Crops, number: npt.NDArray[np.intp], steps: int, rng: np.random.Generator
-) -> Iterator[Batch]:
-    for chosen in shuffled(len(number), BATCH, steps, rng):
-        yield augmented(known.values[chosen], rng), number[chosen], known.whole[chosen]
 
 
 def embed(net: EmbeddingNet, of: Crops) -> tuple[Singles, Singles]:

@@ -34,7 +34,17 @@ def boundary_score(window: Window, cell_m: float, boundaries_m: Floats) -> Bound
     starts = boundaries_m[:, :2] / cell_m
     ends = boundaries_m[:, 2:] / cell_m
     cut = _middles(np.argwhere(window.weights() < CUT_BELOW), window)
-    crossed = _crossed(starts, ends, window)
+
+    # The links between known place nodes, or to one, that a wall or kerb crosses.
+    known = (window.evidence() != 0).any(axis=0)
+    found = crossings(starts, ends)
+    links = np.unique(np.column_stack([found.direction, found.i, found.j]), axis=0)
+    links[:, 1:] -= window.origin
+    cells = links[:, 1:]
+    beyond = cells + LINK_OFFSETS[links[:, 0]]
+    is_inside = _is_inside(cells, known) & _is_inside(beyond, known)
+    is_known = known[tuple(cells[is_inside].T)] | known[tuple(beyond[is_inside].T)]
+    crossed = _middles(links[is_inside][is_known], window)
 
     precision = float("nan")
     if len(cut):
@@ -59,30 +69,6 @@ def _middles(links: Indices, window: Window) -> Floats:
     return middles
 
 
-def _crossed(starts: Floats, ends: Floats, window: Window) -> Floats:
-    """(n, 2): the middles of the links between known place nodes, or to one, that are crossed."""
-    found = crossings(starts, ends)
-    links = np.column_stack([found.direction, found.i, found.j])
-    links = np.unique(links, axis=0)
-    links[:, 1:] -= window.origin
-
-    cells = links[:, 1:]
-    beyond = cells + LINK_OFFSETS[links[:, 0]]
-    known = _known(window)
-    is_inside = _is_inside(cells, known) & _is_inside(beyond, known)
-    links = links[is_inside]
-
-    here = known[tuple(cells[is_inside].T)]
-    there = known[tuple(beyond[is_inside].T)]
-    return _middles(links[here | there], window)
-
-
 def _is_inside(cells: Indices, values: Booleans) -> Booleans:
     is_inside = (cells >= 0) & (cells < values.shape)
     return np.asarray(is_inside.all(axis=1))
-
-
-def _known(window: Window) -> Booleans:
-    """(w, h): the place nodes with evidence on any of their own links."""
-    has_evidence = window.evidence() != 0
-    return np.asarray(has_evidence.any(axis=0))

@@ -13,15 +13,13 @@ from scipy.sparse.csgraph import dijkstra
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.robot import HALF_WIDTH_M
-from cogmap.schemas.sensing import Obstacle, Street, TrueTown
+from cogmap.schemas.sensing import Street, TrueTown
 
 CELL_M = 0.5
 MARGIN_M = 5.0
 BARRIER_M = 1.0
 MOVES = ((1, 0), (1, 1), (0, 1), (-1, 1), (2, 1), (1, 2), (-1, 2), (-2, 1))
 """Half of the moves on the grid: with the knight's of chess, a length is 2.7 % too long at most."""
-
-Canvas = np.ndarray[tuple[int, ...], np.dtype[np.uint8]]
 
 
 class Drivable(NamedTuple):
@@ -33,16 +31,29 @@ class Drivable(NamedTuple):
     @classmethod
     def of(cls, town: TrueTown) -> Drivable:
         """The streets of a town without its obstacles, and with barriers across closed ones."""
-        corner_m, canvas = _blank(town)
+        points_m = np.vstack([np.array(street.line_m, float) for street in town.streets])
+        corner_m = points_m.min(axis=0) - MARGIN_M
+        extent_m = np.ptp(points_m, axis=0) + 2 * MARGIN_M
+        canvas = np.zeros(np.ceil(extent_m / CELL_M).astype(int).tolist(), np.uint8)
+
+        # The ends of a street are round.
         for street in town.streets:
-            _draw_street(canvas, street, corner_m)
+            points = [_pixel(point, corner_m) for point in street.line_m]
+            width = max(1, round(street.width_m / CELL_M))
+            for start, end in pairwise(points):
+                cv2.line(canvas, start, end, 1, width)
 
         for obstacle in town.obstacles:
-            _draw_obstacle(canvas, obstacle, corner_m)
+            pose = obstacle.pose
+            centre = _pixel((pose.x_m, pose.y_m), corner_m)
+            size = (obstacle.width_m / CELL_M, obstacle.length_m / CELL_M)
+            corners = cv2.boxPoints((centre, size, -float(np.degrees(pose.heading_rad))))
+            cv2.fillConvexPoly(canvas, np.rint(corners).astype(np.int32), 0)
 
         for street in town.streets:
             if street.closed:
-                _draw_barrier(canvas, street, corner_m)
+                first, last = (_pixel(end_m.tolist(), corner_m) for end_m in barrier_m(street))
+                cv2.line(canvas, first, last, 0, round(BARRIER_M / CELL_M))
 
         width = 2 * round(HALF_WIDTH_M / CELL_M) + 1
         robot = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (width, width))
@@ -94,37 +105,6 @@ class Drivable(NamedTuple):
         return float(lengths_m.ravel()[self.cell(*end_m)])
 
 
-def _blank(town: TrueTown) -> tuple[Floats, Canvas]:
-    """The corner of a canvas on which a town has room, and the canvas."""
-    lines = [np.array(street.line_m, float) for street in town.streets]
-    points_m = np.vstack(lines)
-    corner_m = points_m.min(axis=0) - MARGIN_M
-
-    extent_m = np.ptp(points_m, axis=0) + 2 * MARGIN_M
-    width, height = np.ceil(extent_m / CELL_M).astype(int).tolist()
-    return corner_m, np.zeros((width, height), np.uint8)
-
-
-def _draw_street(canvas: Canvas, street: Street, corner_m: Floats) -> None:
-    """Draw the surface of a street, its ends round."""
-    points = [_pixel(point, corner_m) for point in street.line_m]
-    width = max(1, round(street.width_m / CELL_M))
-    for start, end in pairwise(points):
-        cv2.line(canvas, start, end, 1, width)
-
-
-def _draw_obstacle(canvas: Canvas, obstacle: Obstacle, corner_m: Floats) -> None:
-    pose = obstacle.pose
-    width = obstacle.width_m / CELL_M
-    length = obstacle.length_m / CELL_M
-    turn_degrees = -float(np.degrees(pose.heading_rad))
-
-    centre = _pixel((pose.x_m, pose.y_m), corner_m)
-    corners = cv2.boxPoints((centre, (width, length), turn_degrees))
-    pixels = np.rint(corners).astype(np.int32)
-    cv2.fillConvexPoly(canvas, pixels, 0)
-
-
 def barrier_m(street: Street) -> Floats:
     """(2, 2): the ends of the barrier that closes a street in its middle, beyond its kerbs."""
     start_m = np.array(street.line_m[0])
@@ -136,11 +116,6 @@ def barrier_m(street: Street) -> Floats:
     left = np.array([-ahead_y_m, ahead_x_m]) / length_m
     across_m = left * (street.width_m + MARGIN_M) / 2
     return np.stack([middle_m - across_m, middle_m + across_m])
-
-
-def _draw_barrier(canvas: Canvas, street: Street, corner_m: Floats) -> None:
-    first, last = (_pixel(end_m.tolist(), corner_m) for end_m in barrier_m(street))
-    cv2.line(canvas, first, last, 0, round(BARRIER_M / CELL_M))
 
 
 def _pixel(point_m: Iterable[float], corner_m: Floats) -> tuple[int, int]:
@@ -159,25 +134,19 @@ def _links(is_free: Booleans) -> sparse.csr_matrix:
     rows: list[Indices] = []
     columns: list[Indices] = []
     lengths: list[Floats] = []
+    width, height = is_free.shape
     for di, dj in MOVES:
-        here, there = _pairs(is_free, number, di, dj)
-        rows.append(here)
-        columns.append(there)
-        lengths.append(np.full(len(here), CELL_M * np.hypot(di, dj)))
+        west = max(0, -di)
+        east = max(0, di)
+        here = (slice(west, width - east), slice(0, height - dj))
+        there = (slice(east, width - west), slice(dj, height))
+
+        are_both_free = is_free[here] & is_free[there]
+        rows.append(number[here][are_both_free])
+        columns.append(number[there][are_both_free])
+        lengths.append(np.full(np.count_nonzero(are_both_free), CELL_M * np.hypot(di, dj)))
 
     entries = np.concatenate(lengths)
     places = (np.concatenate(rows), np.concatenate(columns))
     one_way = sparse.csr_matrix((entries, places), shape=(is_free.size, is_free.size))
     return one_way + one_way.T
-
-
-def _pairs(is_free: Booleans, number: Indices, di: int, dj: int) -> tuple[Indices, Indices]:
-    """The numbers of free cells, and of those a move away that are free too."""
-    width, height = is_free.shape
-    west = max(0, -di)
-    east = max(0, di)
-    here = (slice(west, width - east), slice(0, height - dj))
-    there = (slice(east, width - west), slice(dj, height))
-
-    both = is_free[here] & is_free[there]
-    return number[here][both], number[there][both]

@@ -7,6 +7,7 @@ from scipy.spatial import cKDTree
 
 from benchmarks.explore.boundaries import BoundaryScore, boundary_score
 from benchmarks.explore.trials import centre_lines_m
+from benchmarks.harness import pose_array
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from, transform_to
 from cogmap.graph.graph import Graph
@@ -43,29 +44,15 @@ def explored_share(graph: Graph, town: TrueTown, start: Floats) -> float:
 
 def score_boundaries(graph: Graph, town: TrueTown, start: Floats) -> BoundaryScore:
     """How well the links that are cut agree with the town's kerbs, walls and obstacles."""
-    extent = graph.places.extent(ROOT_MAP)
-    window = graph.places.window(ROOT_MAP, (*WEIGHT_COLUMNS, *EVIDENCE_COLUMNS), extent)
-    return boundary_score(window, graph.cell_m(), _boundaries_m(town, start))
-
-
-def _boundaries_m(town: TrueTown, start: Floats) -> Floats:
-    """(n, 4): the town's kerbs, walls and sides of obstacles, in the frame of the agent's map."""
     kerbs_m = np.asarray(town.kerbs_m.numpy(), np.float64)
     walls_m = np.asarray(town.walls_m.numpy(), np.float64)
-    every_m = np.vstack([kerbs_m, walls_m, _outlines_m(town)])
-
-    on_map_m = transform_to(start, every_m.reshape(-1, 2))
-    return on_map_m.reshape(-1, 4)
-
-
-def _outlines_m(town: TrueTown) -> Floats:
-    """(n, 4): the sides of the obstacles."""
-    sides = [np.zeros((0, 4))]
+    segments_m = [kerbs_m, walls_m]
     for obstacle in town.obstacles:
-        pose = np.array([obstacle.pose.x_m, obstacle.pose.y_m, obstacle.pose.heading_rad])
         half_m = np.array([obstacle.length_m, obstacle.width_m]) / 2
-        corners_m = transform_from(pose, CORNERS * half_m)
-        following_m = np.roll(corners_m, -1, axis=0)
-        sides.append(np.hstack([corners_m, following_m]))
+        corners_m = transform_from(pose_array(obstacle.pose), CORNERS * half_m)
+        segments_m.append(np.hstack([corners_m, np.roll(corners_m, -1, axis=0)]))
 
-    return np.vstack(sides)
+    on_map_m = transform_to(start, np.vstack(segments_m).reshape(-1, 2))
+    extent = graph.places.extent(ROOT_MAP)
+    window = graph.places.window(ROOT_MAP, (*WEIGHT_COLUMNS, *EVIDENCE_COLUMNS), extent)
+    return boundary_score(window, graph.cell_m(), on_map_m.reshape(-1, 4))

@@ -18,6 +18,7 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
 from cogmap.cli.progress import bar
 from cogmap.parallel import parallel_map
+from cogmap.schemas import topics
 
 TOWNS = 10
 FIRST_SEED = 101
@@ -71,7 +72,8 @@ def visit(chosen: Visit) -> Town:
     configured = town_sections(chosen.seed, chosen.has_cameras)
     experimenter = Experimenter(chosen.seed, chosen.explore_s, chosen.goals)
     modules = build(("sim", *agent_modules(chosen.has_cameras)), configured)
-    with running([*modules, experimenter.module()]) as runner:
+    emits = (topics.OFFER, topics.STREET_CLOSURE)
+    with running([*modules, experimenter.module("experimenter", emits)]) as runner:
         runner.run(lambda: experimenter.is_complete)
 
     assert experimenter.boundaries is not None

@@ -11,7 +11,7 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.graph import DropNode, Operation
 from cogmap.schemas.nodes import NEVER_NS, Goal, goal_id
-from cogmap.schemas.sensing import TruePose, TrueTown
+from cogmap.schemas.sensing import TruePose
 
 STOPS = 6
 LEG_NS = 300_000_000_000
@@ -47,28 +47,23 @@ class Courier(TownObserver):
 
         if not self._left:
             here_m = (true.pose.x_m, true.pose.y_m)
-            self._left = self._next_lap(self.town, here_m)
+            drivable = Drivable.of(self.town)
+            while len(self._stops) < STOPS:
+                stop_m, _ = draw_goal(self._rng, self.town, drivable, here_m)
+                self._stops.append(stop_m)
+
+            self.laps += 1 if self._offered else 0
+            self._left = list(self._stops)
+            if self.laps % 2 == 1:
+                another_m, _ = draw_goal(self._rng, self.town, drivable, here_m)
+                order = self._rng.permutation(STOPS).tolist()
+                self._left = [another_m, *(self._stops[number] for number in order)]
 
         self._offered += 1
         self._since_ns = true.stamp_ns
         x_m, y_m = self.to_map(np.array([self._left.pop(0)]))[0].tolist()
         goal = Goal(id=self._goal_id, base_level=1.0, x_m=x_m, y_m=y_m)
         return [Offer(cycle=self.graph.cycle, operations=[*operations, goal])]
-
-    def _next_lap(self, town: TrueTown, here_m: Point) -> list[Point]:
-        """Return the places of the lap that begins."""
-        drivable = Drivable.of(town)
-        while len(self._stops) < STOPS:
-            stop_m, _ = draw_goal(self._rng, town, drivable, here_m)
-            self._stops.append(stop_m)
-
-        self.laps += 1 if self._offered else 0
-        if self.laps % 2 == 0:
-            return list(self._stops)
-
-        another_m, _ = draw_goal(self._rng, town, drivable, here_m)
-        order = self._rng.permutation(STOPS).tolist()
-        return [another_m, *(self._stops[number] for number in order)]
 
     @property
     def _goal_id(self) -> str:

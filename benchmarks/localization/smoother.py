@@ -9,7 +9,6 @@ import numpy as np
 from benchmarks import optional
 from benchmarks.localization.senses import Moment
 from cogmap.geometry.arrays import Floats
-from cogmap.schemas.sensing import Percept
 
 STEPS = 100
 MIN_SD = 1e-4
@@ -67,7 +66,21 @@ class Problem:
         self._start.insert(here, self._pose)
 
         for percept in moment.percepts:
-            self._observe(here, percept)
+            models = self._gtsam.noiseModel
+            sds = np.array([percept.bearing_sd_rad, percept.range_sd_m])
+            cauchy = models.mEstimator.Cauchy.Create(CAUCHY)
+            robust = models.Robust.Create(cauchy, models.Diagonal.Sigmas(sds))
+
+            _, _, number = percept.label.rpartition("-")
+            landmark = self._gtsam.symbol("l", int(number))
+            bearing = self._gtsam.Rot2(percept.bearing_rad)
+            range_m = percept.range_m
+            seen = self._gtsam.BearingRangeFactor2D(here, landmark, bearing, range_m, robust)
+            self._graph.add(seen)
+
+            if not self._start.exists(landmark):
+                direction = np.array([np.cos(percept.bearing_rad), np.sin(percept.bearing_rad)])
+                self._start.insert(landmark, self._pose.transformFrom(range_m * direction))
 
     def solve(self) -> Floats:
         """(n, 3) poses, without the start."""
@@ -76,24 +89,6 @@ class Problem:
         optimizer = self._gtsam.LevenbergMarquardtOptimizer(self._graph, self._start, parameters)
         keys = [self._key(number) for number in range(1, self._count + 1)]
         return optional.gtsam_poses(optimizer.optimize(), keys)
-
-    def _observe(self, here: int, percept: Percept) -> None:
-        models = self._gtsam.noiseModel
-        sds = np.array([percept.bearing_sd_rad, percept.range_sd_m])
-        cauchy = models.mEstimator.Cauchy.Create(CAUCHY)
-        noise = models.Robust.Create(cauchy, models.Diagonal.Sigmas(sds))
-
-        _, _, number = percept.label.rpartition("-")
-        landmark = self._gtsam.symbol("l", int(number))
-        bearing = self._gtsam.Rot2(percept.bearing_rad)
-        factor = self._gtsam.BearingRangeFactor2D(here, landmark, bearing, percept.range_m, noise)
-        self._graph.add(factor)
-
-        if not self._start.exists(landmark):
-            cosine = np.cos(percept.bearing_rad)
-            sine = np.sin(percept.bearing_rad)
-            offset_m = percept.range_m * np.array([cosine, sine])
-            self._start.insert(landmark, self._pose.transformFrom(offset_m))
 
     def _key(self, number: int) -> int:
         key: int = self._gtsam.symbol("x", number)

@@ -104,8 +104,14 @@ def false_closures(
         if later - first < MIN_APART:
             continue
 
-        group = _group(path, (first, later), size, rng)
-        rows += group[: count - len(rows)]
+        # The later places seem to be the first ones, from one side or the other.
+        turned_rad = rng.choice([0.0, np.pi]) + rng.normal(0.0, HEADING_SD_RAD)
+        seen = np.array([*rng.uniform(-POSITION_M, POSITION_M, 2), turned_rad])
+        for step in range(min(size, count - len(rows))):
+            since_first = relative(path[first], path[first + step])
+            since_later = relative(path[later], path[later + step])
+            measured = relative(since_first, compose(seen, since_later))
+            rows.append((first + step, later + step, measured))
 
     i, j, measurement = zip(*rows, strict=True)
     typical = np.median(graph.closures.information, axis=0)
@@ -115,21 +121,3 @@ def false_closures(
         measurement=np.array(measurement),
         information=np.repeat(typical[None], count, axis=0),
     )
-
-
-def _group(
-    path: Floats, places: tuple[int, int], size: int, rng: np.random.Generator
-) -> list[tuple[int, int, Floats]]:
-    """The places that each closure of a group leads from and to, and its measurement, (3,)."""
-    first, later = places
-    turned_rad = rng.choice([0.0, np.pi]) + rng.normal(0.0, HEADING_SD_RAD)
-    seen = np.array([*rng.uniform(-POSITION_M, POSITION_M, 2), turned_rad])
-
-    group = []
-    for step in range(size):
-        since_first = relative(path[first], path[first + step])
-        since_later = relative(path[later], path[later + step])
-        measured = relative(since_first, compose(seen, since_later))
-        group.append((first + step, later + step, measured))
-
-    return group

@@ -88,7 +88,7 @@ def measure(setting: Setting) -> Metrics:
         metrics[key] = float(np.mean(without))
 
     setting.announce(f"a city of {CITY_OBJECTS} objects")
-    return metrics | _speed()
+    return metrics | city_times()
 
 
 def sub_maps_of(made: Town, config: Config, labels: Indices | None = None) -> SubMaps:
@@ -110,9 +110,9 @@ def _settled(made: Town, config: Config) -> Indices:
     return sub_maps.labels
 
 
-def _speed() -> Metrics:
-    """The time of 10,000 objects at once, the least of some times, and of each of some more that
-    arrive then.
+def city_times() -> Metrics:
+    """Return the time of 10,000 objects at once, the least of some times, and of each of some more
+    that arrive then.
     """
     city = town(CITY_SEED, CITY_DISTRICTS, CITY_PLOT_M)
     order = np.random.default_rng(ORDER_SEED).permutation(len(city.positions_m))

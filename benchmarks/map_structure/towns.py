@@ -99,7 +99,15 @@ def town(seed: int, districts: int | None = None, plot_m: float = PLOT_M) -> Tow
 
     boundaries_m = _boundaries(plan, rng)
     positions_m, truth = _objects(plan, boundaries_m, rng)
-    functions = _functions(truth, rng)
+
+    # Functions by the mixes of the districts, of some objects unknown.
+    town_mix = rng.dirichlet(np.full(FUNCTIONS, 3.0))
+    functions = np.full(len(truth), UNKNOWN)
+    for district in np.unique(truth):
+        mix = rng.dirichlet(MIX_CONCENTRATION * town_mix)
+        members = truth == district
+        functions[members] = rng.choice(FUNCTIONS, members.sum(), p=mix)
+    functions[rng.random(len(truth)) < UNKNOWN_SHARE] = UNKNOWN
 
     drifted_m = _Drift(
         waves_per_m=rng.normal(0.0, 1 / DRIFT_LENGTH_M, (DRIFT_WAVES, 2)),
@@ -225,7 +233,17 @@ def _objects(plan: _Plan, boundaries_m: Floats, rng: np.random.Generator) -> tup
 
     for district in range(int(plan.district_of.max()) + 1):
         spacing_m = math.exp(rng.uniform(*np.log(SPACINGS_M)))
-        scattered_m = _scattered(low_m, high_m, spacing_m, rng)
+
+        # Irregular points over all plots, none much closer to another than the spacing.
+        number = int(np.prod(high_m - low_m) / spacing_m**2 * 2)
+        points_m = rng.uniform(low_m, high_m, (number, 2))
+        pairs = cKDTree(points_m).query_pairs(0.75 * spacing_m, output_type="ndarray")
+        is_kept = np.ones(number, bool)
+        for first, second in pairs[np.lexsort(pairs.T)].tolist():
+            if is_kept[first]:
+                is_kept[second] = False
+
+        scattered_m = points_m[is_kept]
         is_inside = plan.district_of[plots.query(scattered_m)[1]] == district
         inside_m = scattered_m[is_inside]
         if len(boundaries_m) and len(inside_m):
@@ -238,35 +256,6 @@ def _objects(plan: _Plan, boundaries_m: Floats, rng: np.random.Generator) -> tup
             districts.append(np.full(len(inside_m), district))
 
     return np.vstack(positions_m), np.concatenate(districts)
-
-
-def _scattered(low_m: Floats, high_m: Floats, spacing_m: float, rng: np.random.Generator) -> Floats:
-    """(k, 2) points over a rectangle, irregular, none much closer to another than the spacing."""
-    count = int(np.prod(high_m - low_m) / spacing_m**2 * 2)
-    points_m = rng.uniform(low_m, high_m, (count, 2))
-    pairs = cKDTree(points_m).query_pairs(0.75 * spacing_m, output_type="ndarray")
-
-    is_kept = np.ones(count, bool)
-    for first, second in pairs[np.lexsort(pairs.T)].tolist():
-        if is_kept[first]:
-            is_kept[second] = False
-
-    kept_m: Floats = points_m[is_kept]
-    return kept_m
-
-
-def _functions(districts: Indices, rng: np.random.Generator) -> Indices:
-    """(n,): the functions of objects, by the mixes of their districts."""
-    town_mix = rng.dirichlet(np.full(FUNCTIONS, 3.0))
-    functions = np.full(len(districts), UNKNOWN)
-
-    for district in np.unique(districts):
-        mix = rng.dirichlet(MIX_CONCENTRATION * town_mix)
-        members = districts == district
-        functions[members] = rng.choice(FUNCTIONS, members.sum(), p=mix)
-
-    functions[rng.random(len(districts)) < UNKNOWN_SHARE] = UNKNOWN
-    return functions
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,14 @@ def open_damaged(folder: Path, stores: int) -> Damaged:
     with bar("opening damaged databases") as progress:
         for store in range(stores):
             copy = folder / f"damaged-{store}.db"
-            copy.write_bytes(_flipped(whole, random) if store % 2 else _cut(whole, random))
+            damaged = bytearray(whole)
+            if store % 2:
+                for _ in range(random.randint(1, MAX_FLIPS)):
+                    damaged[random.randrange(len(whole))] ^= random.randint(1, 255)
+            else:
+                del damaged[random.randrange(len(whole)) :]
+
+            copy.write_bytes(damaged)
             try:
                 with closing(Database(copy)) as database:
                     is_same = list(database.records()) == stored
@@ -136,15 +143,3 @@ def _written_until_killed(path: Path, first: int, random: Random) -> list[int]:
     # The kill may have cut the last line short.
     whole = [line for line in lines if line.endswith("\n")]
     return [int(word) for line in whole for word in line.split()]
-
-
-def _flipped(whole: bytes, random: Random) -> bytes:
-    damaged = bytearray(whole)
-    for _ in range(random.randint(1, MAX_FLIPS)):
-        damaged[random.randrange(len(whole))] ^= random.randint(1, 255)
-
-    return bytes(damaged)
-
-
-def _cut(whole: bytes, random: Random) -> bytes:
-    return whole[: random.randrange(len(whole))]

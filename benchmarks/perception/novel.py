@@ -76,8 +76,11 @@ def remembered(
 
     for meeting in afterwards:
         for number, label, _ in _sightings(meeting):
-            here = meeting.from_where[number]
-            if not all(_is_elsewhere(here, there) for there in places[number]):
+            here_rad, here_m = meeting.from_where[number].tolist()
+            turns_rad = [math.remainder(here_rad - rad, math.tau) for rad, _ in places[number]]
+            if not all(abs(turn_rad) >= MIN_TURN_RAD for turn_rad in turns_rad):
+                continue
+            if not all(other_distance(here_m, float(there_m)) for _, there_m in places[number]):
                 continue
 
             is_known = label in names.values()
@@ -104,11 +107,3 @@ def _sightings(meeting: Meeting) -> list[tuple[int, str, float]]:
             found.append((building.number, segment.label, segment.activation))
 
     return found
-
-
-def _is_elsewhere(here: Floats, there: Floats) -> bool:
-    """Whether `here` is at another side and distance of a building than `there`."""
-    here_rad, here_m = here.tolist()
-    there_rad, there_m = there.tolist()
-    turn_rad = math.remainder(here_rad - there_rad, math.tau)
-    return abs(turn_rad) >= MIN_TURN_RAD and other_distance(here_m, there_m)

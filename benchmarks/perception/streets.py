@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -28,30 +28,24 @@ def edges(areas: Sequence[Rectangle]) -> Floats:
     ys = np.unique(corners[..., 1]).tolist()
     outer = []
 
-    for area in areas:
-        for (start_x, start_y), (end_x, end_y) in _sides(area, xs, ys):
-            x = (start_x + end_x) / 2
-            y = (start_y + end_y) / 2
-            if not any(west < x < east and south < y < north for west, south, east, north in areas):
-                outer.append(((start_x, start_y), (end_x, end_y)))
+    # The sides of an area are cut at every x and y, so that each piece is inside another or not.
+    for west, south, east, north in areas:
+        sides: list[Piece] = []
+        for x, beyond_x in itertools.pairwise(xs):
+            if west <= x and beyond_x <= east:
+                sides += [((x, south), (beyond_x, south)), ((x, north), (beyond_x, north))]
+
+        for y, beyond_y in itertools.pairwise(ys):
+            if south <= y and beyond_y <= north:
+                sides += [((west, y), (west, beyond_y)), ((east, y), (east, beyond_y))]
+
+        for start, end in sides:
+            x, y = ((start[axis] + end[axis]) / 2 for axis in (0, 1))
+            if not any(w < x < e and s < y < n for w, s, e, n in areas):
+                outer.append((start, end))
 
     pieces = np.asarray(outer, np.float64)
     return pieces.reshape(-1, 2, 2)
-
-
-def _sides(area: Rectangle, xs: Sequence[float], ys: Sequence[float]) -> Iterator[Piece]:
-    """The sides of `area`, cut at every x and y of `xs` and `ys`."""
-    west, south, east, north = area
-
-    for x, beyond_x in itertools.pairwise(xs):
-        if west <= x and beyond_x <= east:
-            yield (x, south), (beyond_x, south)
-            yield (x, north), (beyond_x, north)
-
-    for y, beyond_y in itertools.pairwise(ys):
-        if south <= y and beyond_y <= north:
-            yield (west, y), (west, beyond_y)
-            yield (east, y), (east, beyond_y)
 
 
 def distances_m(points_m: npt.ArrayLike, pieces: Floats) -> Floats:

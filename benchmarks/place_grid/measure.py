@@ -40,12 +40,18 @@ def measure(setting: Setting) -> Metrics:
     setting.announce(f"making a map of {SIZE.places} place nodes")
     snapshot = decode(topics.SNAPSHOT, encode(cognitive_map(SIZE)))
     assert isinstance(snapshot, Snapshot)
-    bytes_per_node = _bytes_per_node(snapshot)
+    tracemalloc.start()
+    try:
+        before, _ = tracemalloc.get_traced_memory()
+        replica = Graph()
+        replica.load(snapshot)
+        after, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
 
+    bytes_per_node = (after - before) / (len(replica.places.tiles) * TILE_SIDE**2)
     ledger = Ledger({CODELET: lambda written: True})
     ledger.restore(snapshot)
-    replica = Graph()
-    replica.load(snapshot)
 
     setting.announce(f"committing {CHANGES} changes of a tile")
     rng = np.random.default_rng(SIZE.places)
@@ -100,18 +106,3 @@ def _proposal(number: int, base_version: int, rng: np.random.Generator) -> Propo
         base_version=base_version,
         operations=operations,
     )
-
-
-def _bytes_per_node(snapshot: Snapshot) -> float:
-    """The memory of a replica's place nodes, as allocated, over their number."""
-    tracemalloc.start()
-    try:
-        before, _ = tracemalloc.get_traced_memory()
-        replica = Graph()
-        replica.load(snapshot)
-        after, _ = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-
-    nodes = len(replica.places.tiles) * TILE_SIDE**2
-    return (after - before) / nodes

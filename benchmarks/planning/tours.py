@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -56,10 +55,19 @@ def measure_tsp(folder: Path, processes: int) -> Metrics:
 
     A problem's own is the mean over tours that begin at each of its cities. The optimum is that of
     NAME.opt.tour, or else computed exactly. `tsp_left_out` files are of a type that is not read.
-    Raises UsageError where no problem is of that size.
+    Raises UsageError if no problem is of that size.
     """
     read = tsplib.folder(folder)
-    jobs = _jobs(folder, read.problems)
+    jobs = [
+        _Job(folder, problem)
+        for problem in read.problems
+        if MIN_CITIES <= len(problem) <= MAX_CITIES
+    ]
+    if not jobs:
+        raise UsageError(
+            f"{folder} has no problem of {MIN_CITIES} to {MAX_CITIES} cities: give one with some"
+        )
+
     with bar("planning tours") as progress:
         found = parallel_map(_excess, jobs, processes, progress)
 
@@ -89,20 +97,6 @@ def measure_human(folder: Path, processes: int) -> Metrics:
     return human_metrics(planned)
 
 
-def _jobs(folder: Path, problems: Sequence[Problem]) -> list[_Job]:
-    """Those of the problems that are of the size to be measured."""
-    jobs = []
-    for problem in problems:
-        if MIN_CITIES <= len(problem) <= MAX_CITIES:
-            jobs.append(_Job(folder, problem))
-
-    if not jobs:
-        raise UsageError(
-            f"{folder} has no problem of {MIN_CITIES} to {MAX_CITIES} cities: give one with some"
-        )
-    return jobs
-
-
 def _excess(job: _Job) -> _Excess:
     problem = job.problem
     shortest = tsplib.optimal_tour(job.folder, problem)
@@ -110,26 +104,22 @@ def _excess(job: _Job) -> _Excess:
         shortest = shortest_tour(problem.lengths)
 
     optimum = route_length(problem.lengths, shortest, closed=True)
-    lengths = [_lengths_from(problem, start) for start in range(len(problem))]
-    hierarchical, unstraightened, flat = np.mean(lengths, axis=0).tolist()
+    found = []
+    for start in range(len(problem)):
+        cities = np.roll(np.arange(len(problem)), -start)
+        lengths = problem.lengths[np.ix_(cities, cities)]
+        positions = problem.positions[cities]
+        tours = (
+            order(lengths, positions, TourSettings()),
+            order(lengths, positions, TourSettings(straightens=False)),
+            follow_activation(lengths),
+        )
+        found.append([route_length(lengths, tour, closed=True) for tour in tours])
+
+    hierarchical, unstraightened, flat = np.mean(found, axis=0).tolist()
     return _Excess(
         optimum=optimum,
         hierarchical=hierarchical / optimum - 1.0,
         unstraightened=unstraightened / optimum - 1.0,
         flat=flat / optimum - 1.0,
     )
-
-
-def _lengths_from(problem: Problem, start: int) -> tuple[float, float, float]:
-    """The length of a tour that begins at city `start`: hierarchical, not straightened, flat."""
-    cities = np.roll(np.arange(len(problem)), -start)
-    lengths = problem.lengths[np.ix_(cities, cities)]
-    positions = problem.positions[cities]
-    tours = (
-        order(lengths, positions, TourSettings()),
-        order(lengths, positions, TourSettings(straightens=False)),
-        follow_activation(lengths),
-    )
-    found = [route_length(lengths, tour, closed=True) for tour in tours]
-    hierarchical, unstraightened, flat = found
-    return hierarchical, unstraightened, flat

@@ -45,10 +45,21 @@ class Train:
 
 
 def draw_raster(axes: Axes, spikes: Recording) -> None:
-    """The inputs of the place cell that fires most, and its own spikes where all coincide."""
+    """The inputs of the place cell that fires most, and its own spikes when all coincide."""
     most = int(np.argmax(spikes.counts))
     place = Train("place cell", spikes.place[most], ESTIMATE)
-    trains = [place, *_inputs(spikes, most)]
+
+    # The border cells and the grid cells that it fires with.
+    trains = [place]
+    centre_m = spikes.centres_m[most : most + 1]
+    for axis, fired in enumerate(spikes.border):
+        wall = "west" if axis == WEST else "south"
+        (cell,) = BorderCells(SIDE_M).nearest(centre_m[:, axis])
+        trains.append(Train(f"border cell, {wall} wall", fired[cell], OBJECT))
+
+    for spacing_m, fired in zip(SPACINGS_M, spikes.grid, strict=True):
+        (cell,) = GridModule(spacing_m).nearest(centre_m)
+        trains.append(Train(f"grid cell, {spacing_m:g} m", fired[cell], TRUE))
 
     first_spike = int(np.flatnonzero(place.cycles)[0])
     shown = round(SHOWN_S / GAMMA_S)
@@ -72,20 +83,3 @@ def draw_raster(axes: Axes, spikes: Recording) -> None:
         fontsize=10,
     )
     axes.set_facecolor(PAPER)
-
-
-def _inputs(spikes: Recording, place: int) -> list[Train]:
-    """The border cells and the grid cells that place cell `place` fires with."""
-    centre_m = spikes.centres_m[place : place + 1]
-    trains = []
-
-    for axis, fired in enumerate(spikes.border):
-        wall = "west" if axis == WEST else "south"
-        (cell,) = BorderCells(SIDE_M).nearest(centre_m[:, axis])
-        trains.append(Train(f"border cell, {wall} wall", fired[cell], OBJECT))
-
-    for spacing_m, fired in zip(SPACINGS_M, spikes.grid, strict=True):
-        (cell,) = GridModule(spacing_m).nearest(centre_m)
-        trains.append(Train(f"grid cell, {spacing_m:g} m", fired[cell], TRUE))
-
-    return trains

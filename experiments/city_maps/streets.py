@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,7 +76,9 @@ class Streets:
         for piece in np.unique(cut).tolist():
             start, end = self.pieces[piece].tolist()
             on_it = numbers[cut == piece]
-            pieces += _cut(points_m, start, end, on_it)
+            distances_m = np.hypot(*(points_m[on_it] - points_m[start]).T)
+            between = on_it[np.argsort(distances_m, kind="stable")].tolist()
+            pieces += itertools.pairwise([start, *between, end])
 
         return Streets(points_m, np.array(pieces, np.intp)), numbers
 
@@ -112,16 +114,6 @@ class Streets:
         shape = (count, count)
         graph = coo_array((weights, ends.T), shape=shape)
         return graph.tocsr()
-
-
-def _cut(points_m: Points, start: int, end: int, on_it: Indices) -> Iterable[tuple[int, int]]:
-    """Return the pieces into which points `on_it` cut the piece from `start` to `end`."""
-    offsets_m = points_m[on_it] - points_m[start]
-    distances_m = np.hypot(*offsets_m.T)
-    order = np.argsort(distances_m, kind="stable")
-
-    between = on_it[order].tolist()
-    return itertools.pairwise([start, *between, end])
 
 
 def shortest_path(before: Indices, end: int) -> list[int]:

@@ -55,7 +55,11 @@ def read_city(path: Path) -> StructuredCity:
     middle = middle_of(extract)
 
     centres_m, half_widths_m, functions = _buildings(extract, middle)
-    spots_m, spot_functions = _spots(extract, middle)
+
+    # Places that are points, and whose function is known.
+    spots = {node: _code(tags) for node, tags in extract.node_tags.items() if function_of(tags)}
+    spots_m = _line_m(extract, spots, middle)
+    spot_functions = np.array(list(spots.values()), np.int64)
     is_alone = _give_functions(centres_m, functions, spots_m, spot_functions)
     count = len(centres_m) + int(is_alone.sum())
     if count < MIN_OBJECTS:
@@ -103,12 +107,6 @@ def _buildings(extract: Extract, middle: Floats) -> tuple[Floats, Floats, Indice
         np.array(half_widths_m),
         np.array(functions, np.int64),
     )
-
-
-def _spots(extract: Extract, middle: Floats) -> tuple[Floats, Indices]:
-    """Return places that are points, and whose function is known, (k, 2), and these, (k,)."""
-    functions = {node: _code(tags) for node, tags in extract.node_tags.items() if function_of(tags)}
-    return _line_m(extract, functions, middle), np.array(list(functions.values()), np.int64)
 
 
 def _give_functions(

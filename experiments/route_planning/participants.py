@@ -38,7 +38,10 @@ def tours_of(lengths: Floats, positions: Floats, number: int, seed: int) -> Tour
         start = int(rng.integers(len(lengths)))
         goals = np.roll(np.arange(len(lengths)), -start)
 
-        judged = _judged(lengths[np.ix_(goals, goals)], rng)
+        # Each length is judged with an error of its own, the same in both directions.
+        true = lengths[np.ix_(goals, goals)]
+        errors = np.triu(rng.normal(0.0, LENGTH_ERROR, true.shape), 1)
+        judged = true * np.maximum(1.0 + (errors + errors.T), 0.0)
         turned = _turned(positions[goals], rng)
         limits = TourSettings(span=int(rng.choice(SPANS)))
         hierarchical = order(judged, turned, limits._replace(straightens=False))
@@ -47,14 +50,6 @@ def tours_of(lengths: Floats, positions: Floats, number: int, seed: int) -> Tour
         tours.flat.append(goals[follow_activation(judged)])
 
     return tours
-
-
-def _judged(lengths: Floats, rng: np.random.Generator) -> Floats:
-    """(n, n) lengths as they are judged, each with an error of its own, symmetric."""
-    errors = rng.normal(0.0, LENGTH_ERROR, lengths.shape)
-    upper = np.triu(errors, 1)
-    symmetric = upper + upper.T
-    return np.asarray(lengths * np.maximum(1.0 + symmetric, 0.0))
 
 
 def _turned(positions: Floats, rng: np.random.Generator) -> Floats:

@@ -181,7 +181,16 @@ class ExtendedPam:
             if 1 - recognition.background <= self._config.percept_threshold:
                 continue
 
-            if learning and self._is_new(candidate):
+            # New: well visible, and recognized as nothing with enough activation.
+            segment = candidate.segment
+            is_taught = self._recognizer.is_taught(recognition.label)
+            is_new = (
+                segment.area_px >= MIN_LEARNED_SHARE * segment.mask.size
+                and recognition.appearance.whole > self._config.percept_threshold
+                and recognition.activation
+                <= (self._config.familiar if is_taught else self._config.familiar_learned)
+            )
+            if learning and is_new:
                 number = 1 + len({label for label, _ in self._recognizer.learned})
                 learned.append(self._learn(NEW_LABEL.format(number), recognition))
                 candidate = self._recognized(candidate, expected)
@@ -207,19 +216,6 @@ class ExtendedPam:
         appearance = candidate.recognition.appearance
         recognition = self._recognizer.recognize(appearance, excluded, log_prior)
         return replace(candidate, recognition=recognition)
-
-    def _is_new(self, candidate: Candidate) -> bool:
-        """True if it is well visible, and recognized as nothing with enough activation."""
-        segment = candidate.segment
-        if segment.area_px < MIN_LEARNED_SHARE * segment.mask.size:
-            return False
-
-        recognition = candidate.recognition
-        if recognition.appearance.whole <= self._config.percept_threshold:
-            return False
-        is_taught = self._recognizer.is_taught(recognition.label)
-        familiar = self._config.familiar if is_taught else self._config.familiar_learned
-        return recognition.activation <= familiar
 
     def _learn(self, label: str, recognition: Recognition) -> LearnedObject:
         embedding = recognition.appearance.embedding

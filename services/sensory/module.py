@@ -92,28 +92,23 @@ class SensoryMemory:
         )
         yield ranges
 
-        motion = self._self_motion(frame, view)
-        self._answer = [view, ranges, motion]
-        yield motion
-
-    def _self_motion(self, frame: StereoFrame, view: View) -> SelfMotion:
         began_ns, rows = self._odometry.take(frame.stamp_ns)
         if self._last_ns is None:
             self._last_ns = frame.stamp_ns if began_ns is None else began_ns
-
         since_ns = self._last_ns
         self._last_ns = frame.stamp_ns
 
         image = view.image.numpy().astype(np.uint8, copy=False)
-        depth_m = view.depth_m.numpy().astype(np.float32)
         wheels = self._noise.total(rows)
-        motion = self._visual_odometry.update(image, depth_m, view.calibration, wheels)
-        return SelfMotion(
+        seen = self._visual_odometry.update(image, depth_m, view.calibration, wheels)
+        motion = SelfMotion(
             stamp_ns=frame.stamp_ns,
             frame=frame.frame,
             since_ns=since_ns,
-            motions=Array.of(fuse(rows, motion, wheels)),
+            motions=Array.of(fuse(rows, seen, wheels)),
         )
+        self._answer = [view, ranges, motion]
+        yield motion
 
     def _view(self, frame: StereoFrame) -> View:
         rectified = rectification(frame.calibration)

@@ -187,7 +187,13 @@ def _solve(
     motion = guess.copy()
     information = prior
     for _ in range(ITERATIONS):
-        residual_px, jacobian = _linearize(points, before_px, motion, calibration)
+        # Residuals (n, 2) and their Jacobian (n, 2, 5), by differences.
+        differences = np.vstack([np.zeros(5), np.diag(np.full(5, DIFFERENCE))])
+        column_px, row_px = project_back(points, (motion + differences).T[..., None], calibration)
+        predicted_px, *shifted_px = np.stack([column_px, row_px], axis=2)
+        changes = (np.stack(shifted_px) - predicted_px) / DIFFERENCE
+        residual_px = before_px - predicted_px
+        jacobian = np.ascontiguousarray(np.moveaxis(changes, 0, 2))
 
         # Geman-McClure's weights, over the variance of a track.
         squared = (np.hypot(residual_px[:, 0], residual_px[:, 1]) / OUTLIER_PX) ** 2
@@ -213,17 +219,3 @@ def _solve(
         distance_sd_m=float(deviation[0]),
         turn_sd_rad=float(deviation[2]),
     )
-
-
-def _linearize(
-    points: Points, before_px: Floats, motion: Floats, calibration: Calibration
-) -> tuple[Floats, Floats]:
-    """Residuals (n, 2) in pixels at `motion`, and their Jacobian (n, 2, 5) by differences."""
-    differences = np.vstack([np.zeros(5), np.diag(np.full(5, DIFFERENCE))])
-    motions = motion + differences
-    column_px, row_px = project_back(points, motions.T[..., None], calibration)
-    projected_px = np.stack([column_px, row_px], axis=2)
-
-    predicted_px = projected_px[0]
-    changes = (projected_px[1:] - predicted_px) / DIFFERENCE
-    return before_px - predicted_px, np.ascontiguousarray(np.moveaxis(changes, 0, 2))

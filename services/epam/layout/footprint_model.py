@@ -67,7 +67,25 @@ def _residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
     error_px = disparity_px - problem.disparity_px
 
     of_columns = error_px / problem.sd_px[:, None]
-    of_edges = _edge_residuals(parameters, problem)
+
+    # From each edge to the outermost corner of the rectangle. The true end at a hidden edge may lie
+    # anywhere farther out.
+    x, z, orientation = parameters.T[:, :, None]
+    a = problem.half_m[:, :1] * CORNER_SIGNS_A
+    b = problem.half_m[:, 1:] * CORNER_SIGNS_B
+    cos = np.cos(orientation)
+    sin = np.sin(orientation)
+    corner_x = x + a * cos - b * sin
+    corner_z = z + a * sin + b * cos
+
+    depth_m = np.maximum(corner_z, MIN_RANGE_M)
+    corners_px = camera.cx_px + camera.fx_px * corner_x / depth_m
+    outermost_px = np.stack([corners_px.min(1), corners_px.max(1)], axis=1)
+    error_px = outermost_px - problem.edge_px
+
+    outward_px = error_px * np.array([-1.0, 1.0])
+    is_free = problem.hidden & (outward_px > 0)
+    of_edges = np.where(is_free, 0.0, error_px) / EDGE_SD_PX
     return np.concatenate([of_columns, of_edges], axis=1)
 
 
@@ -94,30 +112,6 @@ def _inverse_depths(parameters: Floats, problem: FootprintProblem) -> Floats:
 
     met = np.isfinite(inverse)
     return np.where(met, inverse, 1 / MIN_RANGE_M)
-
-
-def _edge_residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
-    """(s, 2): from each edge to the outermost corner of the rectangle, in standard deviations. The
-    true end at a hidden edge may lie anywhere farther out.
-    """
-    x, z, orientation = parameters.T[:, :, None]
-    a = problem.half_m[:, :1] * CORNER_SIGNS_A
-    b = problem.half_m[:, 1:] * CORNER_SIGNS_B
-    cos = np.cos(orientation)
-    sin = np.sin(orientation)
-    corner_x = x + a * cos - b * sin
-    corner_z = z + a * sin + b * cos
-
-    camera = problem.camera
-    depth_m = np.maximum(corner_z, MIN_RANGE_M)
-    corners_px = camera.cx_px + camera.fx_px * corner_x / depth_m
-    outermost_px = np.stack([corners_px.min(1), corners_px.max(1)], axis=1)
-    error_px = outermost_px - problem.edge_px
-
-    outward_px = error_px * np.array([-1.0, 1.0])
-    is_free = problem.hidden & (outward_px > 0)
-    counted_px = np.where(is_free, 0.0, error_px)
-    return counted_px / EDGE_SD_PX
 
 
 def linearized(parameters: Floats, copies: FootprintProblem) -> tuple[Floats, Floats]:

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.geometry.arrays import Bytes, Floats, Singles
+from cogmap.geometry.arrays import Bytes, Singles
 from cogmap.schemas.array import Array
 from cogmap.schemas.sensing import PlaceMatch, RememberedView
 from cogmap.services.epam.places.descriptor import (
@@ -140,22 +140,19 @@ class PlaceRecognizer:
         p_new = 1.0 - (1 - P_LOST) * predicted.sum() - found
 
         prior = (1 - P_LOST) * predicted + found / len(predicted)
-        belief = prior * self._likelihood_ratios(vectors)
-        total = belief.sum() + p_new
-        self._belief = belief / total
-        self._p_new = p_new / total
 
-    def _likelihood_ratios(self, vectors: Singles) -> Floats:
-        """How much likelier each remembered view's place makes the observed one than another place;
-        0 for recent views.
-        """
-        similarities = self._vectors[: len(self._views)] @ vectors.T
+        # How much likelier each remembered view's place makes the observed one than another place;
+        # recent views do not match.
+        similarities = self._vectors[:count] @ vectors.T
         highest = similarities.max(axis=1).astype(np.float64)
         log_odds = LOG_ODDS_SLOPE * (highest - EVEN_SIMILARITY)
         ratios = np.exp(log_odds.clip(-MAX_LOG_ODDS, MAX_LOG_ODDS))
-
         ratios[self._step_of_view > self._step - RECENT_VIEWS] = 0.0
-        return np.asarray(ratios)
+
+        belief = prior * ratios
+        total = belief.sum() + p_new
+        self._belief = belief / total
+        self._p_new = p_new / total
 
     def _likeliest_match(self) -> list[PlaceMatch]:
         """The likeliest remembered view, if its probability with its neighbours' reaches the

@@ -193,8 +193,25 @@ def _joined(numbers: npt.NDArray[np.intp], pointed_at: Floats) -> npt.NDArray[np
     """
     area_px = np.bincount(numbers[numbers >= 0])
     count = len(area_px)
-    pair, apart_px = _borders(numbers, pointed_at, count)
 
+    # At each border of two objects: the lower number times `count` plus the higher, and the
+    # distance between the places that the pixels on both sides point to.
+    pairs = []
+    distances_px = []
+    beside = (
+        (numbers[:, :-1], numbers[:, 1:], pointed_at[:, :-1], pointed_at[:, 1:]),
+        (numbers[:-1], numbers[1:], pointed_at[:-1], pointed_at[1:]),
+    )
+    for one_side, other_side, to_one, to_other in beside:
+        is_border = (one_side != other_side) & (one_side >= 0) & (other_side >= 0)
+        both = np.stack([one_side[is_border], other_side[is_border]])
+        lower, higher = np.sort(both, axis=0)
+        pairs.append(lower * count + higher)
+        difference_px = to_one[is_border] - to_other[is_border]
+        distances_px.append(np.hypot(*difference_px.T))
+
+    pair = np.concatenate(pairs)
+    apart_px = np.concatenate(distances_px)
     joined = np.arange(count)
     for each in np.unique(pair).tolist():
         one, other = divmod(each, count)
@@ -204,28 +221,3 @@ def _joined(numbers: npt.NDArray[np.intp], pointed_at: Floats) -> npt.NDArray[np
             joined[joined == joined[other]] = joined[one]
 
     return np.where(numbers >= 0, joined[numbers], numbers)
-
-
-def _borders(
-    numbers: npt.NDArray[np.intp], pointed_at: Floats, count: int
-) -> tuple[npt.NDArray[np.intp], Floats]:
-    """The borders between two of `count` objects: the lower number times `count` plus the higher
-    (n,), and the distance in pixels between the places that the pixels on both sides point to (n,).
-    """
-    pairs = []
-    apart_px = []
-    beside = (
-        (numbers[:, :-1], numbers[:, 1:], pointed_at[:, :-1], pointed_at[:, 1:]),
-        (numbers[:-1], numbers[1:], pointed_at[:-1], pointed_at[1:]),
-    )
-
-    for one, other, to_one, to_other in beside:
-        is_border = (one != other) & (one >= 0) & (other >= 0)
-        both = np.stack([one[is_border], other[is_border]])
-        lower, higher = np.sort(both, axis=0)
-        pairs.append(lower * count + higher)
-
-        difference_px = to_one[is_border] - to_other[is_border]
-        apart_px.append(np.hypot(*difference_px.T))
-
-    return np.concatenate(pairs), np.concatenate(apart_px)
