@@ -22,14 +22,8 @@ from cogmap.services.codelets.mapping.evidence import accumulated, blended, weig
 from cogmap.services.codelets.mapping.local_grid import LocalGrid
 from cogmap.services.codelets.mapping.rays import clear_cells, rays_of
 
-LINK_REACH_M = 25.0
-"""The distance up to which links are cut or freed by what is seen: beyond, the error of a range is
-as large as a place."""
-
-REACH_M = 35.0
-"""The distance up to which what stands there is put on the map, so that the agent finds a street
-closed before it is near: the certainty of each view is small there, and some are needed."""
-
+# The distance up to which links are cut or freed by what is seen.
+REACH_M = 25.0
 # In cells, from the middle of one along both axes: road there is road at the place node, and an
 # edge there is right beside it.
 ROAD_WITHIN = 0.35
@@ -77,10 +71,8 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     is_hit = grid.has(rays.hits())
 
     known_road = np.maximum(known.column(PlaceColumn.ROAD), is_road)
-    is_judged = grid.range_m() <= LINK_REACH_M
-    free = np.where(is_judged, _free(is_road, is_clear, known_road) * certainty, 0.0)
-    cut = np.where(is_judged, cut_links(edges, grid), 0.0)
-    evidence = accumulated(known.evidence(), cut, free)
+    free = _free(is_road, is_clear, known_road) * certainty
+    evidence = accumulated(known.evidence(), cut_links(edges, grid), free)
     has_changed = evidence != known.evidence()
     weights = np.where(has_changed, weights_of(evidence), known.weights())
 

@@ -15,8 +15,6 @@ STEP = 0.5
 MIN_WIDTH_M = 0.3
 # Farther away a ray that grazes a wall may seem to pass through it.
 CLEAR_M = 15.0
-# One that saw nothing may be the fault of the sensor.
-UNSEEN_CLEAR_M = 12.5
 MAX_GAP_M = 1.0
 MAX_GAP_SHARE = 0.05
 # So many points of the road, so far behind what a ray hits, show that nothing stands there.
@@ -52,7 +50,7 @@ def rays_of(scan: Array | None, road_m: Floats, grid: LocalGrid) -> Rays:
     before road that is seen, `road_m` (n, 2), are left out: nothing stands there.
 
     A ray is clear up to half a cell, and twice the standard deviation, before what it hits. One
-    that saw nothing at all is clear for UNSEEN_CLEAR_M.
+    that saw nothing at all, which may be the fault of the sensor, is clear for half the reach.
     """
     rays = np.zeros((0, 2)) if scan is None else np.asarray(scan.numpy(), np.float64)
     angle_rad = float(np.median(np.abs(np.diff(rays[:, 0])))) if len(rays) > 1 else 0.0
@@ -60,7 +58,7 @@ def rays_of(scan: Array | None, road_m: Floats, grid: LocalGrid) -> Rays:
     has_seen = range_m > 0
 
     before_hit_m = range_m * (1 - 2 * RANGE_SD_SHARE) - grid.cell_m / 2
-    clear_m = np.where(has_seen, before_hit_m, UNSEEN_CLEAR_M)
+    clear_m = np.where(has_seen, before_hit_m, grid.reach_m / 2)
 
     ahead = np.column_stack([np.cos(bearing_rad), np.sin(bearing_rad)])
     return Rays(
