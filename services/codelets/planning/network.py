@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -44,6 +45,28 @@ class PlaceNetwork(NamedTuple):
         i, j = cell
         first_i, first_j = self.origin
         return i - first_i, j - first_j
+
+    def cost_m(self, cells: Indices) -> float:
+        """Sum up what a route of (n, 2) neighbouring cells costs; infinite if a link of it is cut,
+        or leads outside.
+        """
+        inside = cells - np.array(self.origin)
+        if (inside < 0).any() or (inside >= self.shape).any():
+            return math.inf
+
+        here = inside[:-1]
+        there = inside[1:]
+        weights = np.zeros(len(here))
+        for of_link, offset in zip(self.weights, LINK_OFFSETS, strict=True):
+            forth = (there - here == offset).all(axis=1)
+            back = (here - there == offset).all(axis=1)
+            weights[forth] = of_link[tuple(here[forth].T)]
+            weights[back] = of_link[tuple(there[back].T)]
+
+        if not weights.all():
+            return math.inf
+        steps_m = np.hypot(*np.diff(cells, axis=0).T) * self.cell_m
+        return float((steps_m / weights).sum())
 
 
 class PlaceGrid(NamedTuple):

@@ -14,7 +14,6 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.graph.graph import Graph
-from cogmap.graph.window import LINK_OFFSETS
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.codelets import Task
@@ -275,30 +274,6 @@ class Visit(NamedTuple):
     field: Field
 
 
-def cost_m(network: PlaceNetwork, cells: Indices) -> float:
-    """Sum up what a route of (n, 2) neighbouring cells costs; infinite if a link of it is cut, or
-    leads outside.
-    """
-    inside = cells - np.array(network.origin)
-    if (inside < 0).any() or (inside >= network.shape).any():
-        return math.inf
-
-    here = inside[:-1]
-    there = inside[1:]
-    weights = np.zeros(len(here))
-    for number, offset in enumerate(LINK_OFFSETS):
-        of_link = network.weights[number]
-        forth = (there - here == offset).all(axis=1)
-        back = (here - there == offset).all(axis=1)
-        weights[forth] = of_link[tuple(here[forth].T)]
-        weights[back] = of_link[tuple(there[back].T)]
-
-    if not weights.all():
-        return math.inf
-    steps_m = np.hypot(*np.diff(cells, axis=0).T) * network.cell_m
-    return float((steps_m / weights).sum())
-
-
 def _ordered(
     found: Sequence[Visit], start: Cell, situation: Situation, network: PlaceNetwork
 ) -> list[Visit]:
@@ -364,8 +339,8 @@ def _serves(outcome: Outcome, situation: Situation) -> bool:
     if is_off or is_at_end or moved > SAME_FRONTIER_CELLS // 2:
         return False
 
-    left_m = cost_m(network, _left_of(before, agent, costs))
-    return left_m <= KEEP_ROUTE * cost_m(network, cells) + network.cell_m
+    left_m = network.cost_m(_left_of(before, agent, costs))
+    return left_m <= KEEP_ROUTE * network.cost_m(cells) + network.cell_m
 
 
 def _aim(plan: Plan) -> tuple[object, ...]:

@@ -18,7 +18,6 @@ from cogmap.services.codelets.planning.network import (
     grid_network,
     place_network,
 )
-from cogmap.services.codelets.planning.route_plan import cost_m
 
 
 def _open_grid(origin: Cell = (0, 0), cell_m: float = 1.0) -> PlaceNetwork:
@@ -57,7 +56,7 @@ def test_a_route_leads_through_the_gap_of_a_wall_without_cutting_its_corners() -
     route = _route(network, (2, 4), (4, 4))
 
     assert route.tolist() == [[2, 4], [2, 5], [3, 5], [4, 5], [4, 4]]
-    assert cost_m(network, route) == pytest.approx(4)
+    assert network.cost_m(route) == pytest.approx(4)
 
 
 def test_a_dear_place_is_avoided() -> None:
@@ -115,7 +114,7 @@ def test_routes_cost_as_little_as_those_of_exact_search(seed: int) -> None:
     for start in np.argwhere(np.isfinite(expected)).tolist():
         route = field.climb((start[0], start[1]))
         assert route is not None
-        assert cost_m(network, route) == pytest.approx(expected[tuple(start)], rel=1e-5)
+        assert network.cost_m(route) == pytest.approx(expected[tuple(start)], rel=1e-5)
 
 
 def _matrix(cost: np.ndarray) -> sparse.csr_matrix:

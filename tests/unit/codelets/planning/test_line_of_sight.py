@@ -7,7 +7,6 @@ import numpy as np
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.services.codelets.planning.line_of_sight import straight, straightened
 from cogmap.services.codelets.planning.network import grid_network
-from cogmap.services.codelets.planning.route_plan import cost_m
 
 CLEAR = np.ones((40, 40))
 
@@ -51,7 +50,7 @@ def test_a_straight_route_is_no_longer_by_its_links() -> None:
 
     route = _cells(straightened(_bent(), CLEAR, np.isfinite(CLEAR), (0, 0)))
 
-    assert cost_m(network, route) <= cost_m(network, _bent())
+    assert network.cost_m(route) <= network.cost_m(_bent())
 
 
 def _walled(wall: tuple[slice, slice]) -> Floats:
