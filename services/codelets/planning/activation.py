@@ -24,42 +24,39 @@ DECAY_PER_CELL = 2.0
 COST_UNIT_M = 2.0**-20
 """Costs are multiples of this, so that their sums are exact and ties are ties on every machine."""
 
-_NONE = -1
+WAVES = (1.3, 2.6, math.inf)
+"""Of the straight line's length, as far as activation spreads at first, then anew, then at last:
+most routes through streets are shorter than the first, nearly all than the second."""
 
 
 class Links:
-    """The links of a network as costs.
-
-    Its nodes are the places that have a link, numbered from 0 in the order of their cells: `places`
-    (n,) are their indices in an array of all cells, `number` (w, h) is -1 elsewhere. `matrix`
-    (n, n) has the cost of each link once.
+    """The links of a network as costs: `matrix` (n, n), between its n cells in their order, has the
+    cost of each link once.
     """
 
     def __init__(self, network: PlaceNetwork) -> None:
-        weights = np.zeros_like(network.weights)
-        is_linked = np.zeros(network.shape, bool)
+        _, width, height = network.weights.shape
+        count = width * height
+
+        # Open links in the order of the cells that own them, as rows of the matrix must be.
+        of_cells = np.zeros((width, height, len(LINK_OFFSETS)), np.float32)
         for number, offset in enumerate(LINK_OFFSETS.tolist()):
-            here, there = ends(network.shape, offset)
-            inside = network.weights[number][here]
-            weights[number][here] = inside
-            is_linked[here] |= inside > 0
-            is_linked[there] |= inside > 0
+            here, _ = ends(network.shape, offset)
+            of_cells[*here, number] = network.weights[number][here]
 
-        _, height = network.shape
-        self.places = np.flatnonzero(is_linked)
-        self.number = np.full(network.shape, _NONE, np.int32)
-        self.number.ravel()[self.places] = np.arange(len(self.places), dtype=np.int32)
-
-        # Open links in the order of the nodes that own them, as rows of the matrix must be.
-        weights = weights.reshape(len(LINK_OFFSETS), -1)[:, self.places].T
-        owner, direction = np.nonzero(weights)
-        beyond = self.places[owner] + (LINK_OFFSETS @ (height, 1))[direction]
+        weights = of_cells.reshape(count, -1)
+        is_open = weights > 0
         units = np.hypot(*LINK_OFFSETS.T) * (network.cell_m / COST_UNIT_M)
-        costs_m = np.ceil(units[direction] / weights[owner, direction].clip(max=1.0)) * COST_UNIT_M
+        costs_m = np.divide(units, weights, out=np.zeros(weights.shape), where=is_open)
+        np.ceil(costs_m, out=costs_m)
+        costs_m *= COST_UNIT_M
 
-        count = len(self.places)
-        starts = np.concatenate([[0], np.count_nonzero(weights, axis=1).cumsum()])
-        entries = (costs_m, self.number.ravel()[beyond], starts.astype(np.int32))
+        steps = (LINK_OFFSETS @ (height, 1)).astype(np.int32)
+        beyond = np.arange(count, dtype=np.int32)[:, None] + steps
+        starts = np.zeros(count + 1, np.int32)
+        np.cumsum(np.count_nonzero(is_open, axis=1), out=starts[1:])
+
+        entries = (costs_m[is_open], beyond[is_open], starts)
         self.matrix = sparse.csr_matrix(entries, shape=(count, count))
 
 
@@ -68,11 +65,11 @@ class Field:
     """Activation over the nodes of a network.
 
     `distance_m`: (width, height), the cost of the cheapest route to the nearest goal; inf where no
-    activation arrives. `upward`: (n,), for each node the one that passed on most activation to it.
+    activation arrives. `upward`: (n,), for each cell the one that passed on most activation to it,
+    negative at goals.
     """
 
     network: PlaceNetwork
-    links: Links
     distance_m: Floats
     upward: Indices
 
@@ -99,37 +96,51 @@ class Field:
         if not self.arrives(start):
             return None
 
-        node = int(self.links.number[self.network.index_of(start)])
-        if node == _NONE:
-            return np.array([start], np.int64)
+        cells = [int(np.ravel_multi_index(self.network.index_of(start), self.network.shape))]
+        while self.upward[cells[-1]] >= 0:
+            cells.append(int(self.upward[cells[-1]]))
 
-        nodes = [node]
-        while self.upward[nodes[-1]] >= 0:
-            nodes.append(int(self.upward[nodes[-1]]))
-
-        i, j = np.unravel_index(self.links.places[nodes], self.network.shape)
-        cells: Indices = np.column_stack([i, j]) + np.array(self.network.origin)
-        return cells
+        i, j = np.unravel_index(cells, self.network.shape)
+        route: Indices = np.column_stack([i, j]) + np.array(self.network.origin)
+        return route
 
 
-def spread(network: PlaceNetwork, goals: Indices, links: Links | None = None) -> Field:
+def spread(
+    network: PlaceNetwork, goals: Indices, links: Links | None = None, until: Cell | None = None
+) -> Field:
     """Spread activation from `goals`, (k, 2) cells of the map; those outside are ignored.
 
-    Whoever spreads several times over one network makes its `links` once.
+    It spreads as far as it can, or in WAVES until it arrives at the cell `until`. Whoever spreads
+    several times over one network makes its `links` once.
     """
     links = links or Links(network)
-    distance_m = np.full(network.shape, np.inf)
-    nodes = []
-    for i, j in goals.tolist():
-        if network.contains((i, j)):
-            place = network.index_of((i, j))
-            distance_m[place] = 0.0
-            nodes.append(int(links.number[place]))
+    inside = goals - np.array(network.origin)
+    inside = inside[((inside >= 0) & (inside < network.shape)).all(axis=1)]
+    field = Field(
+        network=network,
+        distance_m=np.full(network.shape, np.inf),
+        upward=np.full(network.weights[0].size, -1),
+    )
+    if not len(inside):
+        return field
 
-    upward: Indices = np.full(len(links.places), _NONE)
-    nodes = [node for node in nodes if node != _NONE]
-    if nodes:
-        distance_m.ravel()[links.places], upward, _ = dijkstra(
-            links.matrix, directed=False, indices=nodes, min_only=True, return_predecessors=True
+    waves_m = [math.inf]
+    if until is not None:
+        away = np.hypot(*(inside - network.index_of(until)).T).min()
+        waves_m = [wave * max(away, 1.0) * network.cell_m for wave in WAVES]
+
+    sources = np.ravel_multi_index(tuple(inside.T), network.shape)
+    for reach_m in waves_m:
+        distance_m, upward, _ = dijkstra(
+            links.matrix,
+            directed=False,
+            indices=sources,
+            min_only=True,
+            return_predecessors=True,
+            limit=reach_m,
         )
-    return Field(network, links, distance_m, upward)
+        field = Field(network, distance_m.reshape(network.shape), upward)
+        if until is not None and field.arrives(until):
+            break
+
+    return field

@@ -50,16 +50,20 @@ def routes_between(
     """Find the routes between each two of (n, 2) positions; None if one is outside, or not
     connected, or a route costs more than those two's `max_cost_m`, (n, n).
     """
-    links = Links(network)
+    is_linked = network.is_linked()
     cells: list[Cell] = []
-    is_passed = np.zeros(network.shape, bool)
-    for number, end_m in enumerate(ends_m):
-        goal = _linked(network, links, end_m)
-        if goal is None:
+    for end_m in ends_m:
+        cell = _linked(network, is_linked, end_m)
+        if cell is None:
             return None
+        cells.append(cell)
 
-        field = spread(network, np.array([goal]), links)
-        for other, start in enumerate(cells):
+    links = Links(network)
+    is_passed = np.zeros(network.shape, bool)
+    for number, goal in enumerate(cells[1:], start=1):
+        until = cells[0] if number == 1 else None
+        field = spread(network, np.array([goal]), links, until)
+        for other, start in enumerate(cells[:number]):
             route = field.climb(start)
             if route is None:
                 return None
@@ -67,18 +71,17 @@ def routes_between(
             if max_cost_m is not None and cost_m > max_cost_m[number, other]:
                 return None
             is_passed[tuple((route - network.origin).T)] = True
-        cells.append(goal)
 
     return Routes(network.origin, is_passed)
 
 
-def _linked(network: PlaceNetwork, links: Links, position_m: Floats) -> Cell | None:
+def _linked(network: PlaceNetwork, is_linked: Booleans, position_m: Floats) -> Cell | None:
     """Return the cell nearest to a position that a link leads to, within SNAP."""
     middle = np.rint(position_m / network.cell_m).astype(np.int64)
     around = np.argwhere(np.ones((2 * SNAP + 1, 2 * SNAP + 1))) - SNAP
     cells = middle + around[np.hypot(*around.T).argsort(kind="stable")]
     for i, j in cells.tolist():
-        if network.contains((i, j)) and links.number[network.index_of((i, j))] >= 0:
+        if network.contains((i, j)) and is_linked[network.index_of((i, j))]:
             return i, j
 
     return None

@@ -7,7 +7,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
@@ -22,7 +21,7 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.services.codelets.planning.coarse_routes import Routes, coarse_network, routes_between
 from cogmap.services.codelets.planning.config import Config
-from cogmap.services.codelets.planning.network import SQUARE, PlaceGrid
+from cogmap.services.codelets.planning.network import PlaceGrid, with_beside
 from cogmap.services.codelets.planning.sub_map_routes import sub_map_routes
 from cogmap.services.codelets.sub_maps.coarsening import FACTOR
 
@@ -55,7 +54,7 @@ class Corridor(NamedTuple):
     @classmethod
     def beside(cls, routes: Routes) -> Corridor:
         """Return the finer cells of those that routes on a coarse map pass, and of those beside."""
-        is_near = ndimage.binary_dilation(np.pad(routes.is_passed, 1), SQUARE)
+        is_near = with_beside(np.pad(routes.is_passed, 1))
         i, j = np.nonzero(is_near)
         rows = slice(int(i.min()), int(i.max()) + 1)
         columns = slice(int(j.min()), int(j.max()) + 1)

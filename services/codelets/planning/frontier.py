@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from cogmap.services.codelets.planning.activation import Field
 from cogmap.services.codelets.planning.config import Config
-from cogmap.services.codelets.planning.network import SQUARE, Cell
+from cogmap.services.codelets.planning.network import Cell, with_beside
 from cogmap.services.codelets.planning.place_cost import PlaceCosts
 
 # The constants of this module were chosen on simulated towns, by how much of them was explored.
@@ -56,7 +56,7 @@ def best_frontier(
     clearly more.
     """
     is_unknown = costs.is_free & ~costs.is_known
-    is_open = ndimage.binary_dilation(is_unknown, SQUARE) & ~costs.is_visited
+    is_open = with_beside(is_unknown) & ~costs.is_visited
     is_reached = np.isfinite(field.distance_m) & (field.distance_m > config.reached_m)
     is_edge = is_open & costs.is_known_free & is_reached
 
@@ -75,7 +75,7 @@ def best_frontier(
 
     # Of each connected edge, the agent goes to the cell nearest to its middle.
     frontiers = []
-    labels, _ = ndimage.label(is_edge, SQUARE)
+    labels, _ = ndimage.label(is_edge, np.ones((3, 3)))
     for number, box in enumerate(ndimage.find_objects(labels), start=1):
         corner = np.array([side.start for side in box])
         cells = corner + np.argwhere(labels[box] == number)

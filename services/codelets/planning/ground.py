@@ -21,7 +21,7 @@ from cogmap.graph.window import (
     Window,
 )
 from cogmap.schemas.nodes import PathColumn, PlaceColumn, Self
-from cogmap.services.codelets.planning.network import SQUARE, PlaceGrid, ends
+from cogmap.services.codelets.planning.network import PlaceGrid, ends, with_beside
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
 POSITION = slice(PathColumn.X_M, PathColumn.Y_M + 1)
@@ -115,7 +115,7 @@ class Ground(NamedTuple):
         mistake, or a kerb that it can cross; not gaps between obstacles that are no wider than a
         place.
         """
-        is_gap = ndimage.binary_closing(is_obstacle, SQUARE)
+        is_gap = ~with_beside(~with_beside(is_obstacle))
         is_driven = self.grid.is_within(BESIDE_PATH_M, self.path[:, POSITION])
         is_driven &= ~is_gap & ~is_obstacle
         return is_driven
@@ -126,7 +126,7 @@ class Ground(NamedTuple):
         """
         whole = self.grid.has(np.vstack([self.path[:, POSITION], self.here_m]))
         late = self.grid.has(self.since_m(PathColumn.STAMP_S, CAME_S))
-        beside = ndimage.binary_dilation(whole, SQUARE) & ~is_obstacle
+        beside = with_beside(whole) & ~is_obstacle
         return np.asarray(beside | late)
 
     def is_visited(self) -> Booleans:
@@ -174,8 +174,8 @@ def is_obstructed(obstacle: Singles) -> Booleans:
     OBSTACLE_FROM. One counts that is SPREAD_FROM, if the nine places around it are as much obstacle
     as three of them would be that reach it.
     """
-    around = ndimage.uniform_filter(obstacle, 3, mode="constant") * SQUARE.size
-    is_spread = (obstacle >= SPREAD_FROM) & (around >= 3 * OBSTACLE_FROM)
+    around = ndimage.uniform_filter(obstacle, 3, mode="constant")
+    is_spread = (obstacle >= SPREAD_FROM) & (around >= OBSTACLE_FROM / 3)
     return np.asarray((obstacle >= OBSTACLE_FROM) | is_spread)
 
 

@@ -28,35 +28,42 @@ def straightened(route: Indices, cost: Floats, is_clear: Booleans, origin: Cell)
     middles of two cells a straight line has no steps, at which an agent would slow down.
     """
     inside = route - np.array(origin)
+    if len(inside) == 1:
+        return route.astype(np.float64)
+
     steps = np.hypot(*np.diff(inside, axis=0).T)
     dearer = np.maximum(cost[tuple(inside[:-1].T)], cost[tuple(inside[1:].T)])
     spent = np.concatenate([[0.0], np.cumsum(steps * dearer)])
 
     line_cost = np.where(is_clear, cost, np.inf)
-    positions = [inside[:1].astype(np.float64)]
-    at = 0
-    while at < len(inside) - 1:
-        end = _farthest(inside, spent, line_cost, at)
-        cells, _ = straight(inside[at], inside[end][None])
-        exact = np.linspace(inside[at], inside[end], len(cells[0]))
-        positions.append(exact.clip(cells[0] - _INSIDE, cells[0] + _INSIDE)[1:])
-        at = end
+    bends = [0]
+    while bends[-1] < len(inside) - 1:
+        bends.append(_farthest(inside, spent, line_cost, bends[-1]))
 
-    line: Floats = np.concatenate(positions) + np.array(origin)
+    starts = inside[bends[:-1]]
+    ends = inside[bends[1:]]
+    cells, steps = straight(starts, ends)
+    along = np.arange(cells.shape[1])
+    slopes = (ends - starts) / steps[:, None]
+    exact = starts[:, None] + along[:, None] * slopes[:, None]
+    within = np.minimum(np.maximum(exact, cells - _INSIDE), cells + _INSIDE)
+
+    is_step = (along >= 1) & (along <= steps[:, None])
+    line: Floats = np.vstack([inside[:1], within[is_step]]) + np.array(origin)
     return line
 
 
-def straight(start: Indices, ends: Indices) -> tuple[Indices, Indices]:
-    """Return (m, n, 2) neighbouring cells from one to each of (m, 2) others, as nearly in a
-    straight line as can be, each line's last repeated to the length of the longest; (m,) how many
+def straight(starts: Indices, ends: Indices) -> tuple[Indices, Indices]:
+    """Return (m, n, 2) neighbouring cells from (m, 2) or (1, 2) starts to (m, 2) ends, as nearly in
+    a straight line as can be, each line's last repeated to the length of the longest; (m,) how many
     steps each has.
     """
-    away = ends - start
-    steps = np.abs(away).max(axis=1).clip(1)
-    along = np.arange(int(steps.max()) + 1)[:, None].clip(max=steps)
+    away = ends - starts
+    steps = np.maximum(np.abs(away).max(axis=1), 1)
+    along = np.minimum(np.arange(int(steps.max()) + 1), steps[:, None])
     # In whole numbers, so that the line is the same on every machine.
-    moved = (2 * along[..., None] * away + steps[:, None]) // (2 * steps[:, None])
-    cells: Indices = start + moved.swapaxes(0, 1)
+    half = steps[:, None, None]
+    cells: Indices = starts[:, None] + (2 * along[..., None] * away[:, None] + half) // (2 * half)
     return cells, steps
 
 
@@ -68,7 +75,8 @@ def _farthest(route: Indices, spent: Floats, cost: Floats, at: int) -> int:
     first = at + 2
     while first <= last:
         chosen = np.arange(first, min(first + _AT_ONCE, last + 1))
-        is_dearer = _costs(route[at], route[chosen], cost) > spent[chosen] - spent[at] + 1e-9
+        line_cost = _costs(route[at : at + 1], route[chosen], cost)
+        is_dearer = line_cost > spent[chosen] - spent[at] + 1e-9
         if is_dearer.any():
             return max(int(chosen[is_dearer.argmax()]) - 1, at + 1)
         first += _AT_ONCE
@@ -77,11 +85,12 @@ def _farthest(route: Indices, spent: Floats, cost: Floats, at: int) -> int:
 
 
 def _costs(start: Indices, ends: Indices, cost: Floats) -> Floats:
-    """Return the (m,) costs of straight lines, infinite for one that passes a blocked place, or
-    between two of which one is.
+    """Return the (m,) costs of straight lines from (1, 2) to each of (m, 2), infinite for one that
+    passes a blocked place, or between two of which one is.
     """
     cells, steps = straight(start, ends)
-    i, j = cells.transpose(2, 0, 1)
+    i = cells[..., 0]
+    j = cells[..., 1]
     on = cost[i, j]
     dearer = np.maximum(on[:, 1:], on[:, :-1])
     is_corner = np.isinf(cost[i[:, 1:], j[:, :-1]]) | np.isinf(cost[i[:, :-1], j[:, 1:]])

@@ -11,7 +11,6 @@ from scipy import ndimage
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS
 
-SQUARE = np.ones((3, 3), bool)
 Cell = tuple[int, int]
 Slices = tuple[slice, slice]
 
@@ -21,7 +20,8 @@ class PlaceNetwork(NamedTuple):
 
     `origin`: the cell of index [0, 0]; cell (i, j) stands at (i * cell_m, j * cell_m) in the map's
     frame. `weights`: (4, width, height), of the links to the neighbours at LINK_OFFSETS, that is
-    E, NE, N and NW; 0 is not traversable, 1 is free. Links have no direction.
+    E, NE, N and NW; 0 is not traversable, as all that lead outside, 1 is free. Links have no
+    direction.
     """
 
     origin: Cell
@@ -33,6 +33,15 @@ class PlaceNetwork(NamedTuple):
         """Count the cells in width and height."""
         _, width, height = self.weights.shape
         return width, height
+
+    def is_linked(self) -> Booleans:
+        """Mark the cells that a link leads to, (w, h)."""
+        is_linked = np.zeros(self.shape, bool)
+        for of_link, offset in zip(self.weights > 0, LINK_OFFSETS.tolist(), strict=True):
+            here, there = ends(self.shape, offset)
+            is_linked[here] |= of_link[here]
+            is_linked[there] |= of_link[here]
+        return is_linked
 
     def contains(self, cell: Cell) -> bool:
         """Decide whether a cell of the map lies in the network."""
@@ -147,6 +156,17 @@ def place_network(cost: Floats, cell_m: float = 1.0, origin: Cell = (0, 0)) -> P
 def grid_network(free: Booleans, cell_m: float = 1.0, origin: Cell = (0, 0)) -> PlaceNetwork:
     """Make the network of a grid whose cells are `free`, (width, height), or blocked."""
     return place_network(np.where(free, 1.0, np.inf), cell_m, origin)
+
+
+def with_beside(mask: Booleans) -> Booleans:
+    """Mark the places of a (w, h) mask, and the eight beside each."""
+    rows = mask.copy()
+    rows[1:] |= mask[:-1]
+    rows[:-1] |= mask[1:]
+    beside = rows.copy()
+    beside[:, 1:] |= rows[:, :-1]
+    beside[:, :-1] |= rows[:, 1:]
+    return beside
 
 
 def ends(shape: tuple[int, ...], offset: tuple[int, int]) -> tuple[Slices, Slices]:

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import ndimage
 
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
@@ -22,10 +21,10 @@ from cogmap.services.codelets.planning.config import Config
 from cogmap.services.codelets.planning.corridor import Corridor
 from cogmap.services.codelets.planning.ground import Ground
 from cogmap.services.codelets.planning.network import (
-    SQUARE,
     PlaceGrid,
     PlaceNetwork,
     place_network,
+    with_beside,
 )
 
 BESIDE_COST = 2.0
@@ -111,7 +110,7 @@ def place_costs(
     is_edge = ground.is_cut() & ~is_driven & ~is_obstacle
     is_narrow = narrow(is_obstacle, ground.grid.cell_m) & ~is_driven & ~is_edge
     is_blocked = is_edge | is_obstacle | is_narrow
-    is_beside = ndimage.binary_dilation(is_blocked, SQUARE) & ~is_blocked
+    is_beside = with_beside(is_blocked) & ~is_blocked
 
     # Blocked road is tried the later, the less time has passed since the agent looked at it; not
     # at all if it was so near that it would have seen it free.
@@ -137,7 +136,7 @@ def place_costs(
         is_inside=np.ones(ground.grid.shape, bool) if within is None else within.is_inside,
         is_free=~is_blocked,
         is_known=is_known,
-        is_clear=~ndimage.binary_dilation(is_obstacle, SQUARE),
+        is_clear=~with_beside(is_obstacle),
         is_return=is_return,
         is_visited=ground.is_visited(),
     )

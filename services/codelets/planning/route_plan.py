@@ -177,11 +177,12 @@ def planned(situation: Situation, costs: PlaceCosts) -> Outcome:
     found: list[Visit] = []
     unreachable = {}
     links = Links(network) if targets else None
+    until = start if len(targets) == 1 else None
     for target in targets:
         if not target.cells:
             unreachable[target.goal.id] = target.state
             continue
-        field = spread(network, np.array(target.cells), links)
+        field = spread(network, np.array(target.cells), links, until)
         route = field.climb(start)
         if route is None:
             unreachable[target.goal.id] = PlanState.NO_ROUTE

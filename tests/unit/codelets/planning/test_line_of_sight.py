@@ -108,7 +108,7 @@ def test_a_route_of_one_place_stays() -> None:
 
 
 def test_a_straight_line_is_the_same_wherever_it_is_drawn() -> None:
-    here, _ = straight(np.array([0, 0]), np.array([[7, -3]]))
-    there, _ = straight(np.array([-100, 40]), np.array([[-93, 37]]))
+    here, _ = straight(np.array([[0, 0]]), np.array([[7, -3]]))
+    there, _ = straight(np.array([[-100, 40]]), np.array([[-93, 37]]))
 
     assert (there - here == (-100, 40)).all()
