@@ -29,6 +29,7 @@ THRESHOLDS = {
     "broadcasts_per_s": within(3, 10),
     "conscious_latency_ms_p50": at_most(200),
     "survived_share": at_least(1),
+    "lowest_energy": at_least(0.15),
     "guided_share": at_least(0.9),
 }
 

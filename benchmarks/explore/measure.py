@@ -26,8 +26,8 @@ EXPLORE_S = 900.0
 GOALS = 10
 THRESHOLDS = {
     "explored_share": at_least(0.9),
-    "goals_reached_share": at_least(0.98),
-    "way_over_shortest": at_most(1.15),
+    "goals_reached_share": at_least(1),
+    "way_over_shortest": at_most(1.12),
     "collisions": at_most(0),
     "boundary_precision": at_least(0.9),
     "boundary_recall": at_least(0.9),

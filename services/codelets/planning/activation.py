@@ -43,20 +43,18 @@ class Links:
         for number, offset in enumerate(LINK_OFFSETS.tolist()):
             here, _ = ends(network.shape, offset)
             of_cells[*here, number] = network.weights[number][here]
+        weights = of_cells.ravel()
+        links = np.flatnonzero(weights).astype(np.int32)
+        owner, direction = np.divmod(links, len(LINK_OFFSETS))
 
-        weights = of_cells.reshape(count, -1)
-        is_open = weights > 0
         units = np.hypot(*LINK_OFFSETS.T) * (network.cell_m / COST_UNIT_M)
-        costs_m = np.divide(units, weights, out=np.zeros(weights.shape), where=is_open)
-        np.ceil(costs_m, out=costs_m)
-        costs_m *= COST_UNIT_M
-
+        costs_m = np.ceil(units[direction] / weights[links]) * COST_UNIT_M
         steps = (LINK_OFFSETS @ (height, 1)).astype(np.int32)
-        beyond = np.arange(count, dtype=np.int32)[:, None] + steps
+        beyond = owner + steps[direction]
         starts = np.zeros(count + 1, np.int32)
-        np.cumsum(np.count_nonzero(is_open, axis=1), out=starts[1:])
+        np.cumsum(np.bincount(owner, minlength=count), out=starts[1:])
 
-        entries = (costs_m[is_open], beyond[is_open], starts)
+        entries = (costs_m, beyond, starts)
         self.matrix = sparse.csr_matrix(entries, shape=(count, count))
 
 

@@ -137,7 +137,7 @@ class Ground(NamedTuple):
         """Mark what the agent was near enough to see for sure in the last `since_s`, (w, h)."""
         return self.grid.is_within(NEAR_M, self.since_m(PathColumn.LAST_S, since_s))
 
-    def looked_ago_s(self, since_s: float) -> Floats:
+    def looked_ago_s(self, since_s: float) -> Singles:
         """Return how long ago the agent looked at each place (w, h) from within LOOK_M; infinite if
         that was not within the last `since_s`.
         """
@@ -153,7 +153,7 @@ class Ground(NamedTuple):
 
         lately_s = self.grid.minimum(positions_m, np.repeat(ago_s[is_late], len(distance_m)))
         side = 2 * round(LOOK_BESIDE_M / self.grid.cell_m) + 1
-        ago_beside_s: Floats = ndimage.minimum_filter(lately_s, side, mode="constant", cval=np.inf)
+        ago_beside_s: Singles = ndimage.minimum_filter(lately_s, side, mode="constant", cval=np.inf)
         return ago_beside_s
 
     @property

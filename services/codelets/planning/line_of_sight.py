@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats, Indices
+from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.services.codelets.planning.network import Cell
 
 MAX_CELLS = 100
@@ -19,7 +19,7 @@ _AT_ONCE = 12
 _INSIDE = 0.49
 
 
-def straightened(route: Indices, cost: Floats, is_clear: Booleans, origin: Cell) -> Floats:
+def straightened(route: Indices, cost: Singles, is_clear: Booleans, origin: Cell) -> Floats:
     """Replace the bends of a route of (n, 2) neighbouring cells by straight lines of at most
     MAX_CELLS, if these are no dearer by the cost of places, and lead over clear ones alone; (w, h)
     each, from the cell `origin`.
@@ -67,7 +67,7 @@ def straight(starts: Indices, ends: Indices) -> tuple[Indices, Indices]:
     return cells, steps
 
 
-def _farthest(route: Indices, spent: Floats, cost: Floats, at: int) -> int:
+def _farthest(route: Indices, spent: Floats, cost: Singles, at: int) -> int:
     """Return the number of the last cell of a route before one to which a line from number `at` is
     dearer than the route; that of the next cell in any case.
     """
@@ -84,7 +84,7 @@ def _farthest(route: Indices, spent: Floats, cost: Floats, at: int) -> int:
     return max(last, at + 1)
 
 
-def _costs(start: Indices, ends: Indices, cost: Floats) -> Floats:
+def _costs(start: Indices, ends: Indices, cost: Singles) -> Floats:
     """Return the (m,) costs of straight lines from (1, 2) to each of (m, 2), infinite for one that
     passes a blocked place, or between two of which one is.
     """

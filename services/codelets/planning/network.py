@@ -99,12 +99,12 @@ class PlaceGrid(NamedTuple):
         has[tuple(cells[is_inside].T)] = True
         return has
 
-    def minimum(self, positions_m: Floats, values: Floats) -> Floats:
+    def minimum(self, positions_m: Floats, values: Floats) -> Singles:
         """(w, h): the minimum of the (n,) values at (n, 2) positions in each cell, infinite where
         there is none.
         """
         cells, is_inside = self._cells(positions_m)
-        minimum = np.full(self.shape, np.inf)
+        minimum = np.full(self.shape, np.inf, np.float32)
         np.minimum.at(minimum, tuple(cells[is_inside].T), values[is_inside])
         return minimum
 
@@ -133,7 +133,9 @@ class PlaceGrid(NamedTuple):
         return cells, ((cells >= 0) & (cells < self.shape)).all(axis=1)
 
 
-def place_network(cost: Floats, cell_m: float = 1.0, origin: Cell = (0, 0)) -> PlaceNetwork:
+def place_network(
+    cost: Singles | Floats, cell_m: float = 1.0, origin: Cell = (0, 0)
+) -> PlaceNetwork:
     """Make the network of places that cost so many times their length to drive over, (w, h), at
     least 1; infinite where they are blocked.
 
@@ -142,8 +144,8 @@ def place_network(cost: Floats, cell_m: float = 1.0, origin: Cell = (0, 0)) -> P
     """
     ease = (1 / cost).astype(np.float32)
     weights = np.zeros((len(LINK_OFFSETS), *cost.shape), np.float32)
-    for number, (di, dj) in enumerate(LINK_OFFSETS.tolist()):
-        here, there = ends(cost.shape, (di, dj))
+    for number, offset in enumerate(LINK_OFFSETS.tolist()):
+        here, there = ends(cost.shape, offset)
         along_i = there[0], here[1]
         along_j = here[0], there[1]
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats
+from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
 from cogmap.graph.window import LINK_OFFSETS, Extent
 from cogmap.robot import HALF_WIDTH_M
@@ -59,7 +59,7 @@ class PlaceCosts(NamedTuple):
     """
 
     grid: PlaceGrid
-    layers: dict[CostLayer, Floats]
+    layers: dict[CostLayer, Singles]
     is_inside: Booleans
     is_free: Booleans
     is_known: Booleans
@@ -72,9 +72,9 @@ class PlaceCosts(NamedTuple):
         """Mark the places that are known and that nothing blocks, (w, h)."""
         return np.asarray(self.is_known & self.is_free)
 
-    def cost(self, *without: CostLayer) -> Floats:
+    def cost(self, *without: CostLayer) -> Singles:
         """Multiply the layers, but for some, (w, h)."""
-        product: Floats = np.where(self.is_inside, 1.0, np.inf)
+        product = _factor(~self.is_inside, np.inf)
         for layer, factor in self.layers.items():
             if layer not in without:
                 product *= factor
@@ -115,7 +115,7 @@ def place_costs(
     # Blocked road is tried the later, the less time has passed since the agent looked at it; not
     # at all if it was so near that it would have seen it free.
     is_return = ground.is_return(is_obstacle)
-    blocked_cost = np.where(is_known, BLOCKED_COST, np.inf)
+    blocked_cost = np.where(is_known, np.float32(BLOCKED_COST), np.float32(np.inf))
     blocked_cost[is_return] = RETURN_COST
     after_s = config.reopens_after_s
     seen_cost = 1 / (ground.looked_ago_s(after_s) / after_s).clip(LATEST_LOOK_SHARE, 1.0)
@@ -123,12 +123,12 @@ def place_costs(
     seen_cost[is_return] = 1.0
 
     layers = {
-        CostLayer.UNKNOWN: np.where(is_known, 1.0, config.unknown_cost),
-        CostLayer.EDGE: np.where(is_edge, blocked_cost, 1.0),
-        CostLayer.OBSTACLE: np.where(is_obstacle, blocked_cost, 1.0),
-        CostLayer.NARROW: np.where(is_narrow, blocked_cost, 1.0),
-        CostLayer.SEEN_LATELY: np.where(is_blocked, seen_cost, 1.0),
-        CostLayer.BESIDE: np.where(is_beside, BESIDE_COST, 1.0),
+        CostLayer.UNKNOWN: _factor(~is_known, config.unknown_cost),
+        CostLayer.EDGE: _factor(is_edge, blocked_cost),
+        CostLayer.OBSTACLE: _factor(is_obstacle, blocked_cost),
+        CostLayer.NARROW: _factor(is_narrow, blocked_cost),
+        CostLayer.SEEN_LATELY: _factor(is_blocked, seen_cost),
+        CostLayer.BESIDE: _factor(is_beside, BESIDE_COST),
     }
     return PlaceCosts(
         grid=ground.grid,
@@ -140,6 +140,11 @@ def place_costs(
         is_return=is_return,
         is_visited=ground.is_visited(),
     )
+
+
+def _factor(mask: Booleans, factor: Singles | Floats | float) -> Singles:
+    """Return a factor on the cost of the places of a mask, 1 elsewhere, (w, h)."""
+    return np.where(mask, np.asarray(factor, np.float32), np.float32(1.0))
 
 
 def extent_with(goals: Sequence[Goal], graph: Graph, map_id: str) -> Extent:
