@@ -58,8 +58,16 @@ LOOK_TAKES_S = 10.0
 CAME_S = 60.0
 """Where the agent drove so lately it can drive back, whatever stands there by now."""
 
-SPREAD_FROM = 0.2
-"""A place that is this much an obstacle is one if places beside it are in part as well."""
+PART_FROM = 0.2
+"""A place that is this much an obstacle may be a part of a larger one."""
+
+GROUP_FROM = 3 * OBSTACLE_FROM
+"""Of the sum over connected places, from which on they are an obstacle together: as much as three
+places are that count by themselves."""
+
+
+EIGHT = np.ones((3, 3), bool)
+"""Places are connected to their eight neighbours."""
 
 
 class Ground(NamedTuple):
@@ -171,12 +179,14 @@ def is_obstructed(obstacle: Singles) -> Booleans:
     """Mark where something stands, (w, h), by how much each place is an obstacle.
 
     From far a thing is seen now in a place, now in the one behind it, so that none reaches
-    OBSTACLE_FROM. One counts that is SPREAD_FROM, if the nine places around it are as much obstacle
-    as three of them would be that reach it.
+    OBSTACLE_FROM at first, or a part of them does. Connected places from PART_FROM on count
+    together.
     """
-    around = ndimage.uniform_filter(obstacle, 3, mode="constant")
-    is_spread = (obstacle >= SPREAD_FROM) & (around >= OBSTACLE_FROM / 3)
-    return np.asarray((obstacle >= OBSTACLE_FROM) | is_spread)
+    groups, number = ndimage.label(obstacle >= PART_FROM, EIGHT)
+    total = np.bincount(groups.ravel(), obstacle.ravel(), minlength=number + 1)
+    is_whole = total >= GROUP_FROM
+    is_whole[0] = False
+    return np.asarray((obstacle >= OBSTACLE_FROM) | is_whole[groups])
 
 
 def since_start(path: Floats) -> Floats:
