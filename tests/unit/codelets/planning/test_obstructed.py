@@ -7,23 +7,22 @@ import numpy as np
 from cogmap.services.codelets.planning.ground import is_obstructed
 
 
-def _obstacle(**rows: float) -> np.ndarray:
-    """Make a map of 12 x 12 places with barriers in some rows, from column 2 to 9."""
+def _barrier(share: float) -> np.ndarray:
+    """Make a map of 12 x 12 places with a barrier in row 5, in columns 2 to 9."""
     obstacle = np.zeros((12, 12), np.float32)
-    for name, share in rows.items():
-        obstacle[int(name.removeprefix("row")), 2:10] = share
+    obstacle[5, 2:10] = share
     return obstacle
 
 
 def test_a_barrier_that_is_seen_from_far_stands_as_a_whole() -> None:
-    is_there = is_obstructed(_obstacle(row5=0.25))
+    is_there = is_obstructed(_barrier(0.25))
 
     assert is_there[5, 2:10].all()
     assert is_there.sum() == 8
 
 
 def test_the_rest_of_a_barrier_counts_when_a_part_of_it_is_sure() -> None:
-    obstacle = _obstacle(row5=0.2)
+    obstacle = _barrier(0.2)
     obstacle[5, 2:5] = 0.6
 
     assert is_obstructed(obstacle)[5, 2:10].all()
