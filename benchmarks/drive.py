@@ -44,13 +44,13 @@ class TimedStop(Stop):
 
     @property
     def asked(self) -> bool:
-        """Whether to end."""
+        """Return whether to end."""
         is_over = self._elapsed_s >= self._seconds
         return is_over or super().asked
 
     @property
     def interrupted(self) -> bool:
-        """Whether a signal asked for the end."""
+        """Return whether a signal asked for the end."""
         return super().asked
 
     def show(self, sentence: str) -> None:
@@ -107,7 +107,7 @@ def drive(
 
 
 def recording(folder: Path) -> Summary:
-    """The recorder's summary of the drive in `folder`. Raises CogmapError if it has none."""
+    """Read the recorder's summary of the drive in `folder`. Raises CogmapError if it has none."""
     about = LogReader(folder / LOG_NAME).about(SUMMARY)
 
     if not about:

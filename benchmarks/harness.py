@@ -116,12 +116,12 @@ class TownObserver:
         return []
 
     def to_map(self, points_m: Floats) -> Floats:
-        """Points (n, 2) of the true frame in that of the agent's map."""
+        """Transform points (n, 2) of the true frame to that of the agent's map."""
         assert self.start is not None
         return transform_to(self.start, points_m)
 
     def to_truth(self, points_m: Floats) -> Floats:
-        """Points (n, 2) of the agent's map in the true frame."""
+        """Transform points (n, 2) of the agent's map to the true frame."""
         assert self.start is not None
         return transform_from(self.start, points_m)
 
@@ -147,7 +147,7 @@ class CycleMeter:
 
     @property
     def cycles(self) -> int:
-        """The number of cycles that have ended."""
+        """Return the number of cycles that have ended."""
         return len(self.marks) - 1
 
     def listen(self, runner: InProcessRunner, counted: Iterable[Topic]) -> None:

@@ -14,7 +14,7 @@ REMEDY = "is not installed, and this benchmark needs it: run make bench-setup"
 
 
 def gtsam() -> Any:
-    """The package gtsam, which has no types. Raises UsageError if it is not installed."""
+    """Load gtsam, which has no types. Raises UsageError if it is not installed."""
     try:
         import gtsam
     except ImportError:
@@ -24,7 +24,7 @@ def gtsam() -> Any:
 
 
 def scikit_learn() -> Any:
-    """The package scikit-learn, which has no types. Raises UsageError if it is not installed."""
+    """Load scikit-learn, which has no types. Raises UsageError if it is not installed."""
     try:
         import sklearn.metrics
         import sklearn.mixture
@@ -35,7 +35,7 @@ def scikit_learn() -> Any:
 
 
 def threadpoolctl() -> Any:
-    """The package threadpoolctl, which has no types. Raises UsageError if it is missing."""
+    """Load threadpoolctl, which has no types. Raises UsageError if it is not installed."""
     try:
         import threadpoolctl
     except ImportError:
@@ -45,7 +45,7 @@ def threadpoolctl() -> Any:
 
 
 def gtsam_poses(values: Any, keys: Iterable[int]) -> Floats:
-    """(n, 3) poses in the plane, of gtsam's `values` at `keys`: x_m, y_m, heading_rad."""
+    """Return (n, 3) poses in the plane, of gtsam's `values` at `keys`: x_m, y_m, heading_rad."""
     poses = []
     for key in keys:
         pose = values.atPose2(key)
@@ -55,10 +55,10 @@ def gtsam_poses(values: Any, keys: Iterable[int]) -> Floats:
 
 
 def trajectory_error_m(positions_m: Floats, truth_m: Floats) -> float:
-    """Root mean square distance of (n, 2) positions from the true ones, once aligned with them.
+    """Return the root mean square distance of (n, 2) positions from the true ones, once aligned.
 
-    Aligned in the plane, by a rotation and a translation (Umeyama 1991); the scale stays. Raises
-    UsageError if evo is not installed.
+    They are aligned in the plane, by a rotation and a translation (Umeyama 1991); the scale stays.
+    Raises UsageError if evo is not installed.
     """
     try:
         from evo.core.geometry import umeyama_alignment
@@ -81,6 +81,6 @@ def trajectory_error_m(positions_m: Floats, truth_m: Floats) -> float:
 
 
 def _in_space(positions_m: Floats) -> Floats:
-    """(n, 2) positions as (n, 3), on the ground."""
+    """Return (n, 2) positions as (n, 3), on the ground."""
     heights_m = np.zeros(len(positions_m))
     return np.column_stack([positions_m, heights_m])

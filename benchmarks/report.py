@@ -29,7 +29,7 @@ class Outcome:
 
     @property
     def missed(self) -> list[str]:
-        """The keys whose threshold is missed, or that were not measured."""
+        """Return the keys whose threshold is missed, or that were not measured."""
         missed = []
         for key, threshold in self.thresholds.items():
             value = self.metrics.get(key, math.nan)
@@ -55,7 +55,7 @@ def report(outcome: Outcome, json_path: Path | None) -> None:
 
 
 def summary(outcomes: list[Outcome]) -> Table:
-    """One table of all benchmarks, a section each."""
+    """Make one table of all benchmarks, a section each."""
     table = _table("all benchmarks")
 
     for outcome in outcomes:
@@ -84,7 +84,7 @@ def _table(title: str) -> Table:
 
 
 def _add_rows(table: Table, outcome: Outcome) -> None:
-    """Keys with a threshold come first; those without one explain the others."""
+    """Add the keys with a threshold first; those without one explain the others."""
     missed = outcome.missed
     for key, threshold in outcome.thresholds.items():
         value = outcome.metrics.get(key)

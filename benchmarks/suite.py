@@ -163,7 +163,7 @@ def run(benchmark: Benchmark, setting: Setting, data: Path | None) -> Outcome:
 def _measured(
     measure: Callable[..., Metrics], setting: Setting, arguments: Mapping[str, Any]
 ) -> tuple[Metrics, str]:
-    """The metrics, and why there are none."""
+    """Return the metrics, and the reason if there are none."""
     try:
         return measure(setting, **arguments), ""
     except CogmapError as error:
@@ -175,7 +175,7 @@ def _measured(
 
 
 def merged(outcomes: Sequence[Outcome]) -> Metrics:
-    """All metrics by key; a key that an earlier benchmark has gets the benchmark's name before."""
+    """Merge all metrics by key; a key that is taken gets its benchmark's name before it."""
     found: Metrics = {}
 
     for outcome in outcomes:

@@ -15,7 +15,7 @@ class Threshold:
     exclusive: bool = False
 
     def is_met(self, value: float) -> bool:
-        """Whether `value` lies within the limits, or between them where they are exclusive."""
+        """Decide whether `value` lies within the limits, or between them if they are exclusive."""
         if self.exclusive:
             return self.minimum < value < self.maximum
 
@@ -37,20 +37,20 @@ Thresholds = dict[str, Threshold]
 
 
 def at_most(limit: float) -> Threshold:
-    """Met by `limit` and less."""
+    """Make a threshold that is met by `limit` and less."""
     return Threshold(maximum=limit)
 
 
 def at_least(limit: float) -> Threshold:
-    """Met by `limit` and more."""
+    """Make a threshold that is met by `limit` and more."""
     return Threshold(minimum=limit)
 
 
 def more_than(limit: float) -> Threshold:
-    """Met by more than `limit`."""
+    """Make a threshold that is met by more than `limit`."""
     return Threshold(minimum=limit, exclusive=True)
 
 
 def within(minimum: float, maximum: float) -> Threshold:
-    """Met by both limits and what lies between."""
+    """Make a threshold that is met by both limits and what lies between."""
     return Threshold(minimum, maximum)

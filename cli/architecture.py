@@ -46,9 +46,9 @@ def architecture(check: bool, page: Path) -> None:
 
 
 def renewed(text: str) -> str:
-    """`text` with each generated part, between its two comments, as it is now.
+    """Return `text` with each generated part, between its two comments, brought up to date.
 
-    Raises UsageError where a part has no place.
+    Raises UsageError if a part has no place.
     """
     modules = [registry.build(name, _WITHOUT_SCREEN) for name in registry.MODULES]
     for name, generate in _PARTS.items():
@@ -62,9 +62,9 @@ def renewed(text: str) -> str:
 
 
 def diagram(modules: list[Module]) -> str:
-    """Modules as boxes and topics as arrows, in Mermaid.
+    """Draw modules as boxes and topics as arrows, in Mermaid.
 
-    A topic that no module subscribes leads to the observers.
+    A topic that no module subscribes to leads to the observers.
     """
     lines = ["```mermaid", "flowchart TD"]
     lines += [f'    {module.name}["{module.name}"]' for module in modules]
@@ -86,7 +86,7 @@ def diagram(modules: list[Module]) -> str:
 
 
 def topic_table(modules: list[Module]) -> str:
-    """The table of topics, with their publishers and subscribers."""
+    """Write the table of topics, with their publishers and subscribers."""
     lines = [
         "| topic | message | rate | delivery | scope | from | to |",
         "|---|---|---|---|---|---|---|",
@@ -107,7 +107,7 @@ def topic_table(modules: list[Module]) -> str:
 
 
 def codelet_table(modules: list[Module]) -> str:
-    """The table of codelets: when they run, what they read, and what they may write."""
+    """Write the table of codelets: when they run, what they read, and what they may write."""
     lines = ["| codelet | phase | reads | writes |", "|---|---|---|---|"]
     for codelet in own_codelets():
         reads = _kinds(codelet.reads)
@@ -117,14 +117,14 @@ def codelet_table(modules: list[Module]) -> str:
 
 
 def _kinds(written: frozenset[Written]) -> str:
-    """Kinds of nodes, then of links and place columns, by name."""
+    """List the kinds of nodes, then those of links and place columns, by name."""
     nodes = sorted(kind.__name__ for kind in written if isinstance(kind, type))
     others = sorted(f"`{kind}`" for kind in written if not isinstance(kind, type))
     return ", ".join(nodes + others) or "nothing"
 
 
 def ends(topic: Topic, modules: list[Module]) -> tuple[list[str], list[str]]:
-    """Who sends `topic` and who receives it: modules by name, else the observers."""
+    """Find who sends `topic` and who receives it: modules by name, else the observers."""
     if topic.delivery is not Delivery.ON_REQUEST:
         senders = [module.name for module in modules if topic in module.emits]
         receivers = [module.name for module in modules if topic in module.handlers]

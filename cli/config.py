@@ -73,7 +73,7 @@ def print_config(
 
 
 def file_schema() -> Schema:
-    """The JSON Schema (2020-12) of the configuration file: an object with one for each section."""
+    """Make the JSON Schema (2020-12) of the configuration file: its sections, each an object."""
     names = registry.sections()
     kinds = [registry.config_type(name) for name in names]
     references, definitions = msgspec.json.schema_components(kinds, ref_template="#/$defs/{name}")
@@ -88,7 +88,7 @@ def file_schema() -> Schema:
 
 
 def described(sections: Sections) -> dict[str, Any]:
-    """For each key of each module, its value and its schema: description, type and bounds."""
+    """Return the value and the schema (description, type, bounds) of each key of each module."""
     whole = file_schema()
     modules = {}
     for name, values in sections.items():
@@ -100,7 +100,7 @@ def described(sections: Sections) -> dict[str, Any]:
 
 
 def _keys(schema: Schema, whole: Schema) -> dict[str, Schema]:
-    """The schema of each key of the object that `schema` describes; none for any other type."""
+    """Return the schema of each key of the object that `schema` describes; none for other types."""
     for option in (schema, *schema.get("anyOf", ())):
         if "$ref" in option:
             name = option["$ref"].rpartition("/")[2]
@@ -110,7 +110,7 @@ def _keys(schema: Schema, whole: Schema) -> dict[str, Schema]:
 
 
 def commented_toml(sections: Sections) -> str:
-    """`sections` as a TOML file with a comment before each key that has a description."""
+    """Format `sections` as a TOML file with a comment before each key that has a description."""
     whole = file_schema()
     lines: list[str] = []
     for name, values in sections.items():
@@ -121,7 +121,7 @@ def commented_toml(sections: Sections) -> str:
 def _table(
     path: list[str], values: dict[str, Any], keys: dict[str, Schema], whole: Schema
 ) -> list[str]:
-    """The table at `path`: its own keys, then the tables inside it."""
+    """Return the lines of the table at `path`: its own keys, then the tables inside it."""
     lines = [f"[{'.'.join(path)}]"]
     tables: list[str] = []
     unnamed = [key for key in values if key not in keys]
@@ -153,21 +153,35 @@ def _array_of_tables(path: list[str], tables: list[dict[str, Any]]) -> list[str]
 
 
 def _comment(schema: Schema) -> list[str]:
-    description = schema.get("description", "")
+    """Make the comment of a key: its description and its range."""
     bounds = _range(schema)
-    if bounds and bounds not in description:
-        description = f"{description} ({bounds})"
+    description = schema.get("description", "") + (f" ({bounds})" if bounds else "")
     return textwrap.wrap(
         description, COLUMNS, initial_indent="# ", subsequent_indent="# ", break_long_words=False
     )
 
 
 def _range(schema: Schema) -> str:
-    """The range of a number in words, such as "above 0 to 1"; empty for what has none."""
+    """Return the range of a number in words, such as "above 0 to 1", or of a text's length; empty
+    if there is none.
+    """
     lowest = schema.get("minimum", schema.get("exclusiveMinimum"))
     highest = schema.get("maximum", schema.get("exclusiveMaximum"))
-    if lowest is None or highest is None:
-        return ""
+    if lowest is None and highest is None:
+        longest = schema.get("maxLength")
+        return "" if longest is None else f"{schema.get('minLength', 0)} to {longest} characters"
 
-    words = f"{lowest:g} to {highest:g}".replace("e+0", "e").replace("e+", "e")
-    return words if "minimum" in schema else f"above {words}"
+    words = []
+    if lowest is not None:
+        at_least = "" if highest is not None else "at least "
+        words.append(("above " if "exclusiveMinimum" in schema else at_least) + _number(lowest))
+    if highest is not None:
+        words.append(("to " if words else "at most ") + _number(highest))
+    return " ".join(words)
+
+
+def _number(value: float) -> str:
+    """Write a bound: a whole number in full, any other in few characters."""
+    if isinstance(value, int):
+        return str(value)
+    return f"{value:g}".replace("e+0", "e").replace("e+", "e")

@@ -13,7 +13,7 @@ LOG_NAME = "log.mcap"
 
 
 def log_file(path: Path) -> Path:
-    """The log at `path`, or the one in the run's folder at `path`."""
+    """Return the log at `path`, or the one in the run's folder at `path`."""
     return path / LOG_NAME if path.is_dir() else path
 
 

@@ -77,9 +77,9 @@ class Person:
         return [Offer(cycle=self.graph.cycle, operations=[*operations, *self._goals])]
 
     def _plan_of(self, delta: Delta) -> Plan | None:
-        """The plan, committed since the offer, once each given goal is in it or reached.
+        """Return the plan, committed since the offer, once each given goal is in it or reached.
 
-        Where the agent passes a goal before it is planned, no plan ever has it.
+        If the agent passes a goal before it is planned, no plan ever has it.
         """
         plan = self.graph.get(Plan, PLAN_ID)
         if plan is None or not any(isinstance(item, Plan | Goal) for item in delta.operations):
@@ -200,7 +200,7 @@ def parsed(words: Iterable[str]) -> list[Goal]:
 
 
 def _number(word: str) -> float | None:
-    """The metres that a word gives; None where it is no number. Raises UsageError."""
+    """Return the metres that a word gives; None if it is no number. Raises UsageError."""
     try:
         value = float(word)
     except ValueError:
@@ -212,8 +212,8 @@ def _number(word: str) -> float | None:
 
 
 def read_goals(path: Path) -> list[Goal]:
-    """The goals of a file, one a line. Raises UsageError, which names the line, and where there is
-    none.
+    """Read the goals of a file, one a line. Raises UsageError for a wrong line, which it names, and
+    if there is none.
     """
     goals = []
     for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1):
@@ -228,8 +228,8 @@ def read_goals(path: Path) -> list[Goal]:
 
 
 def plan_json(plan: Plan, graph: Graph, reached: Iterable[str] = ()) -> bytes:
-    """The plan as JSON, with the goals reached before they were planned, and what may have been
-    meant by goals that are not on the map.
+    """Encode the plan as JSON, with the goals reached before they were planned, and what may have
+    been meant by goals that are not on the map.
     """
     nearest = {}
     for goal, state in plan.unreachable.items():
@@ -249,7 +249,7 @@ def plan_json(plan: Plan, graph: Graph, reached: Iterable[str] = ()) -> bytes:
 
 
 def plan_text(plan: Plan, graph: Graph, reached: Iterable[str] = ()) -> str:
-    """The plan as a person reads it, and the goals reached before they were planned."""
+    """Write the plan as a person reads it, and the goals reached before they were planned."""
     lines = [f"{name_of(goal)}: reached" for goal in reached]
     for number, name in enumerate(plan.goals, start=1):
         distance = f", {plan.length_m:.0f} m" if number == 1 else ""

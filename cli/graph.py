@@ -36,7 +36,7 @@ def graph(dot: bool, as_json: bool, connect: str, agent: str) -> None:
 
 
 def uses_of(system: System) -> dict[Process, dict[Role, list[Topic]]]:
-    """The topics that each process uses: processes by name, topics in the order of the table."""
+    """Find the topics that each process uses: processes by name, topics in the table's order."""
     uses: dict[Process, dict[Role, list[Topic]]] = {}
     for process in system.processes:
         uses[process] = {role: [] for role in Role}
@@ -49,7 +49,7 @@ def uses_of(system: System) -> dict[Process, dict[Role, list[Topic]]]:
 
 
 def to_tree(system: System) -> str:
-    """The system as a tree that people read."""
+    """Draw the system as a tree that people read."""
     if not system.processes:
         return f"no process of {system.agent!r} is on the bus"
 
@@ -71,7 +71,7 @@ def to_tree(system: System) -> str:
 
 
 def to_json(system: System) -> str:
-    """The system as a list of processes that programs read."""
+    """Encode the system as a list of processes that programs read."""
     processes = []
     for process, roles in uses_of(system).items():
         facts: dict[str, Any] = {
@@ -86,7 +86,7 @@ def to_json(system: System) -> str:
 
 
 def to_dot(system: System) -> str:
-    """The system in Graphviz's language: processes are ellipses, topics are boxes."""
+    """Write the system in Graphviz's language: processes are ellipses, topics are boxes."""
     lines = ["digraph cogmap {", "  rankdir=LR;"]
     lines += [f'  "{topic.name}" [shape=box];' for topic in system.topics()]
     for process, roles in uses_of(system).items():

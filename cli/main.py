@@ -41,7 +41,7 @@ VERBS = {
 @click.version_option(VERSION, message="cogmap %(version)s")
 @click.option("--verbose", is_flag=True, help="Log debugging messages too.")
 def cogmap(verbose: bool) -> None:
-    """LIDA's cognitive cycle with spatial memory, every module a process on a message bus."""
+    """Run LIDA's cognitive cycle with spatial memory, every module a process on a message bus."""
     logging.basicConfig(
         level=logging.DEBUG if verbose else logging.INFO,
         format="%(asctime)s %(message)s",

@@ -17,7 +17,7 @@ SHOWN_AFTER_S = 2.0
 
 @contextmanager
 def bar(label: str) -> Iterator[reader.Progress]:
-    """A function of the share done, which a terminal shows after SHOWN_AFTER_S."""
+    """Yield a function of the share done; a terminal shows that share after SHOWN_AFTER_S."""
     began_s = time.monotonic()
     progress = Progress(
         console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()

@@ -52,7 +52,7 @@ def schemes(log: Path, out: Path | None) -> None:
 
 
 def learned(path: Path) -> list[GuidanceScheme]:
-    """The guidance schemes of a log, as they were published last. Raises LogError."""
+    """Read the guidance schemes of a log, as they were published last. Raises LogError."""
     found: dict[str, GuidanceScheme] = {}
     for entry in open_log(path).messages(topics.BEHAVIOURS.name):
         assert isinstance(entry.message, Behaviours)

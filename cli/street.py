@@ -70,7 +70,7 @@ def change(closure: StreetClosure, connect: str, agent: str) -> None:
 
 
 def _is_shown(closure: StreetClosure, inbox: Inbox, intake: Intake) -> bool:
-    """Whether a town that is published within a second shows the street as it should be."""
+    """Decide whether a town that is published within a second shows the street as asked."""
     until_s = time.monotonic() + 1.0
     while (left_s := until_s - time.monotonic()) > 0:
         arrival = inbox.take(left_s)
@@ -81,7 +81,7 @@ def _is_shown(closure: StreetClosure, inbox: Inbox, intake: Intake) -> bool:
 
 
 def is_as_asked(town: TrueTown, closure: StreetClosure) -> bool:
-    """Whether a town has the street, closed or open as asked."""
+    """Decide whether a town has the street, closed or open as asked."""
     return any(
         street.name == closure.street and street.closed == closure.closed for street in town.streets
     )

@@ -7,12 +7,12 @@ from collections.abc import Iterable
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
-    """The known word that is most like `word`; empty where none is like it."""
+    """Return the known word that is most like `word`; an empty string if none is like it."""
     close = difflib.get_close_matches(word, [str(each) for each in known], 1)
     return close[0] if close else ""
 
 
 def did_you_mean(word: str, known: Iterable[str], otherwise: str) -> str:
-    """The end of a sentence about an unknown `word`; `otherwise` where none is like it."""
+    """Return the end of a sentence about an unknown `word`; `otherwise` if none is like it."""
     meant = nearest(word, known)
     return f"did you mean {meant!r}?" if meant else otherwise

@@ -69,7 +69,7 @@ def _end_with(parent: int) -> None:
 
 
 def _watch(parent: int) -> None:
-    """A process whose parent has ended is given another one."""
+    """Exit when `parent` has ended: this process then has another parent."""
     while os.getppid() == parent:
         time.sleep(POLL_S)
 

@@ -9,7 +9,7 @@ from examples import wanderer
 
 
 def drive(frames: int) -> list[TruePose]:
-    """The robot's true poses while the wanderer answers that many frames, in lockstep."""
+    """Return the robot's true poses while the wanderer answers that many frames, in lockstep."""
     poses: list[TruePose] = []
     sections = {"run": {"lockstep": True}, "sim": {"egl": False}}
     runner = InProcessRunner(

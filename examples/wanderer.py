@@ -37,9 +37,9 @@ class Wanderer:
         self._config = config
 
     def on_scan(self, scan: RangeScan) -> MotorCommand:
-        """The command that answers a scan.
+        """Return the command that answers a scan.
 
-        Raises MessageError where its bearings and ranges are not as many.
+        Raises MessageError if it has not as many bearings as ranges.
         """
         bearing_rad = scan.bearing_rad.numpy().astype(np.float64)
         range_m = scan.range_m.numpy().astype(np.float64)
@@ -58,7 +58,7 @@ class Wanderer:
 
 
 def build(config: Config, instance: str = "motor") -> Module:
-    """The module `motor`, by range scan alone."""
+    """Build the module `motor`, by range scan alone."""
     wanderer = Wanderer(config)
     module = Module("motor", instance)
     return module.on(topics.SCAN, wanderer.on_scan, emits=[topics.MOTOR_COMMAND])

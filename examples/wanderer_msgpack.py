@@ -26,12 +26,12 @@ CRUISE_RAD_S = 10.0
 
 
 def floats(packed: dict[str, Any]) -> array.array[float]:
-    """The values of an array of dtype <f4."""
+    """Return the values of an array of dtype <f4."""
     return array.array("f", packed["data"])
 
 
 def command(scan: dict[str, Any], number: int) -> dict[str, Any]:
-    """The message that answers a scan."""
+    """Return the message that answers a scan."""
     blocked = False
     for bearing_rad, range_m in zip(
         floats(scan["bearing_rad"]), floats(scan["range_m"]), strict=True
@@ -49,13 +49,13 @@ def command(scan: dict[str, Any], number: int) -> dict[str, Any]:
 
 
 def envelope(number: int, cause: list[Any]) -> list[Any]:
-    """The envelope of an answer: source, number, incarnation, sent, born, stages, causes."""
+    """Make the envelope of an answer: source, number, incarnation, sent, born, stages, causes."""
     born_ns = cause[4]
     return [INSTANCE, number, STARTED_NS, time.time_ns(), born_ns, [], []]
 
 
 def configuration(endpoint: str) -> zenoh.Config:
-    """A client of the router at `endpoint`."""
+    """Configure a client of the router at `endpoint`."""
     config = zenoh.Config()
     settings = {
         "mode": "client",

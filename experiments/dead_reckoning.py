@@ -43,7 +43,7 @@ class DeadReckoning:
         self._poses.append((x_m, y_m, heading_rad))
 
     def poses(self, stamps_s: Floats) -> Floats:
-        """(n, 3) at each of `stamps_s`, interpolated."""
+        """Interpolate the poses (n, 3) at each of `stamps_s`."""
         known_s = np.array(self._stamps_s)
         poses = np.array(self._poses)
         return interpolate(known_s, poses, stamps_s)

@@ -37,12 +37,12 @@ def self_pose(graph: Graph) -> Pose:
 
 
 def path_rows(graph: Graph) -> Floats:
-    """(n, 11) rows of the path, the oldest first: see STAMP, POSE and ODOMETRY."""
+    """Return the (n, 11) rows of the path, the oldest first: see STAMP, POSE and ODOMETRY."""
     return rows_of(graph.of_kind(PathSegment))
 
 
 def object_positions_m(graph: Graph, labels: Sequence[str]) -> Floats:
-    """(n, 2): where the objects of that label stand; NaN for one that is not on the map."""
+    """Return where the objects of these labels stand, (n, 2); NaN for one not on the map."""
     positions_m = np.full((len(labels), 2), np.nan)
 
     for row, label in enumerate(labels):
@@ -60,7 +60,7 @@ def observations(graph: Graph) -> Sightings:
 
 
 def road_m(graph: Graph) -> Floats:
-    """(n, 2): the middles of the cells that are road."""
+    """Return the middles of the cells that are road, (n, 2)."""
     cells, _ = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
     indices = cells.astype(np.float64)
     return indices * graph.cell_m()

@@ -38,7 +38,7 @@ class Transcript:
         return module
 
     def has_as_many_as(self, other: Transcript) -> bool:
-        """Return if it has at least as many messages of each topic."""
+        """Decide whether it has at least as many messages of each topic."""
         return all(len(self.messages[name]) >= len(there) for name, there in other.messages.items())
 
     def differs_from(self, other: Transcript) -> list[str]:

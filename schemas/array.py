@@ -51,7 +51,7 @@ class Array(msgspec.Struct, frozen=True, eq=False, gc=False):
 
     @classmethod
     def of(cls, values: npt.ArrayLike, dtype: str | None = None) -> Array:
-        """Wrap `values`, without a copy where they are contiguous and of that dtype already."""
+        """Wrap `values`, without a copy if they are contiguous and of that dtype already."""
         array = np.ascontiguousarray(values, dtype)
         content = array.reshape(-1).view(np.uint8)
         return cls(array.dtype.str, array.shape, content.data)

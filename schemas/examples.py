@@ -86,7 +86,7 @@ def completed(kind: inspect.Type, known: Any = msgspec.UNSET, default: Any = Non
 
 
 def _member(types: Iterable[inspect.Type], known: Any) -> inspect.Type:
-    """The member of a union of `types` that `known` is of; the first one if it is UNSET."""
+    """Return the member of a union of `types` that `known` is of; the first one if it is UNSET."""
     members = [each for each in types if not isinstance(each, inspect.NoneType)]
     if known is msgspec.UNSET or (len(members) == 1 and known is not None):
         return members[0]
@@ -98,7 +98,7 @@ def _member(types: Iterable[inspect.Type], known: Any) -> inspect.Type:
 
 
 def _absent(item: inspect.Type, values: list[Any]) -> list[inspect.StructType]:
-    """The kinds that a list lacks which has most kinds of a union, as the operations of a delta."""
+    """Return the kinds of a union that a list lacks, if it has most, as a delta's operations."""
     kinds = item.types if isinstance(item, inspect.UnionType) else ()
     tagged = [each for each in kinds if isinstance(each, inspect.StructType) and each.tag]
     present = {value[kind.tag_field] for kind in tagged[:1] for value in values}
@@ -131,7 +131,7 @@ def scalar(kind: inspect.Type, default: Any) -> Any:
 
 
 def _within(kind: inspect.IntType | inspect.FloatType, values: list[Any]) -> list[Any]:
-    """`values`, or if these are out of bounds, those that the bounds allow."""
+    """Return the `values` within bounds, or if there are none, those that the bounds allow."""
     low = kind.ge if kind.ge is not None else kind.gt
     high = kind.le if kind.le is not None else kind.lt
     inside = [

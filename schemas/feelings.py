@@ -28,7 +28,7 @@ def salience_of(feelings: Mapping[Feeling, float]) -> float:
     """Return the salience of what `feelings` are attached to, each with its activation, 0 to 1:
     that of the most active one, below 0 if it is unpleasant; 0 without any.
 
-    Of equals the one that comes first in Feeling counts.
+    Of equally active ones, the one that comes first in Feeling counts.
     """
     ordered = [feeling for feeling in Feeling if feeling in feelings]
     if not ordered:

@@ -32,7 +32,7 @@ class StoredObjects(Part, kw_only=True, frozen=True, tag="objects"):
 
     @property
     def key(self) -> str:
-        """The key of the record that it replaces."""
+        """Return the key of the record that it replaces."""
         return f"{self.map}/objects"
 
 
@@ -51,7 +51,7 @@ class StoredTile(Part, kw_only=True, frozen=True, tag="tile"):
 
     @property
     def key(self) -> str:
-        """The key of the record that it replaces."""
+        """Return the key of the record that it replaces."""
         return tile_key(self.map, self.x, self.y)
 
 
@@ -66,7 +66,7 @@ class StoredTree(Part, kw_only=True, frozen=True, tag="tree"):
 
     @property
     def key(self) -> str:
-        """The key of the record that it replaces."""
+        """Return the key of the record that it replaces."""
         return f"{self.map}/tree"
 
 
@@ -90,7 +90,7 @@ class StoredEpisode(Part, kw_only=True, frozen=True):
 
     @property
     def key(self) -> str:
-        """The key of the record that it replaces."""
+        """Return the key of the record that it replaces."""
         return f"episode/{self.number}"
 
 

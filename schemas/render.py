@@ -83,7 +83,7 @@ def field(message: Any, path: str) -> Any:
 
 
 def _plain(value: Any, of_array: Callable[[Array | Matrix], Any]) -> Any:
-    """`value` as dicts, lists and scalars, each array in it as `of_array` returns it."""
+    """Return `value` as dicts, lists and scalars, each array in it as `of_array` returns it."""
     if isinstance(value, Array | Matrix):
         return of_array(value)
     if isinstance(value, enum.Enum):

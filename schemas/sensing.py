@@ -124,17 +124,17 @@ class Percept(Part, kw_only=True, frozen=True):
 
     @property
     def salience(self) -> float:
-        """How much its feelings make it matter, -1 to 1."""
+        """Return how much its feelings make it matter, -1 to 1."""
         return salience_of(self.feelings)
 
     @property
     def has_bearing(self) -> bool:
-        """True if the bearing is known: its standard deviation is below a half turn."""
+        """Return whether the bearing is known: its standard deviation is below a half turn."""
         return self.bearing_sd_rad < math.pi
 
     @property
     def has_range(self) -> bool:
-        """True if the range is known: its standard deviation is below the range."""
+        """Return whether the range is known: its standard deviation is below the range."""
         return self.range_sd_m < self.range_m
 
 

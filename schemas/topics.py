@@ -58,7 +58,7 @@ class Topic:
 
     @property
     def file_stem(self) -> str:
-        """The name of a file about this topic, without a suffix."""
+        """Return the name of a file about this topic, without a suffix."""
         return self.name.replace("/", ".")
 
 

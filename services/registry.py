@@ -64,20 +64,20 @@ _OF_CODELETS = (
 
 
 def codelets() -> tuple[Codelet, ...]:
-    """All codelets that there are to run: ours, and those of other packages. Raises ConfigError."""
+    """Return all codelets to run: ours, and those of other packages. Raises ConfigError."""
     from cogmap.services.codelets.table import all_codelets
 
     return all_codelets()
 
 
 def _settings_of_codelets() -> dict[str, type[msgspec.Struct]]:
-    """The types of the codelets' settings by section. Raises ConfigError."""
+    """Return the types of the codelets' settings by section. Raises ConfigError."""
     return _settings_found_on(tuple(sys.path))
 
 
 @cache
 def _settings_found_on(path: tuple[str, ...]) -> dict[str, type[msgspec.Struct]]:
-    """The same, where packages are found on that `path`."""
+    """Return the types of the codelets' settings, where packages are found on that `path`."""
     from cogmap.runtime.codelet import ENTRY_POINTS
 
     if entry_points(group=ENTRY_POINTS):
@@ -89,8 +89,8 @@ def _settings_found_on(path: tuple[str, ...]) -> dict[str, type[msgspec.Struct]]
 
 
 def config_type(name: str) -> type[msgspec.Struct]:
-    """The configuration struct of a section: the run's, a module's, or that of another package's
-    codelet.
+    """Return the configuration struct of a section: the run's, a module's, or that of another
+    package's codelet.
 
     Raises UsageError naming the modules there are.
     """
@@ -106,13 +106,13 @@ def config_type(name: str) -> type[msgspec.Struct]:
 
 
 def sections() -> tuple[str, ...]:
-    """The sections that a configuration may have: the run, modules, and codelets of others."""
+    """List the sections that a configuration may have: the run, modules, and codelets of others."""
     others = _settings_of_codelets().keys() - set(MODULES)
     return (run.SECTION, *MODULES, *sorted(others))
 
 
 def runs_codelets(name: str) -> bool:
-    """Whether module `name` has the codelets in it."""
+    """Decide whether module `name` has the codelets in it."""
     return name in {"workspace", "codelets"}
 
 
@@ -145,7 +145,7 @@ def prepare(name: str) -> Iterator[None]:
 
 
 def build(name: str, settings: config.Sections, instance: str = "") -> Module:
-    """Module `name`, configured from its section. Raises UsageError, ConfigError."""
+    """Build module `name`, configured from its section. Raises UsageError, ConfigError."""
     if not settings.keys() <= {run.SECTION, *MODULES}:
         config.check_sections(settings, sections())
     if name not in ENTRIES:

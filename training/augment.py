@@ -87,7 +87,7 @@ def augmented(
 
 
 def _sloped(labelled: LabelledImage, slope: float, rng: np.random.Generator) -> LabelledImage:
-    """`labelled` as a camera sees it that is turned, or on a road that rises or falls."""
+    """Turn `labelled` into what a turned camera sees, or one on a road that rises or falls."""
     height, width = labelled.image.shape[:2]
     corners_px = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
     moved = rng.uniform(-slope, slope, (4, 2)) * (width, height / 2)
@@ -106,8 +106,8 @@ def _sloped(labelled: LabelledImage, slope: float, rng: np.random.Generator) -> 
 
 
 def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) -> Floats:
-    """The affine map, (2, 3), from pixels of an image of `size` (h, w) to those of its variation:
-    zoomed, turned, shifted and perhaps mirrored.
+    """Draw the affine map, (2, 3), from pixels of an image of `size` (h, w) to those of its
+    variation: zoomed, turned, shifted and perhaps mirrored.
     """
     zoom = np.exp(rng.uniform(*np.log(how.zoom)))
     turn_rad = np.radians(rng.uniform(-how.turn_deg, how.turn_deg))
@@ -133,7 +133,7 @@ def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) 
 
 
 def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes:
-    """`image` (HEIGHT_PX, WIDTH_PX, 3) in another light, by another camera."""
+    """Show `image` (HEIGHT_PX, WIDTH_PX, 3) in another light, by another camera."""
     if rng.random() < how.blur_share:
         blurred = cv2.GaussianBlur(image, (3, 3), rng.uniform(0.4, 1.0))
         image = blurred.astype(np.float32, copy=False)
@@ -171,7 +171,7 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
 
 
 def _shadow(rng: np.random.Generator) -> Singles:
-    """The share of light that remains, (HEIGHT_PX, WIDTH_PX, 1), in a shadow in a straight band."""
+    """Draw the share of light left in a straight band of shadow, (HEIGHT_PX, WIDTH_PX, 1)."""
     rows, columns = np.indices((HEIGHT_PX, WIDTH_PX), dtype=np.float32, sparse=True)
     direction_rad = rng.uniform(0, np.pi)
     right_px = np.cos(direction_rad) * (columns - WIDTH_PX / 2)

@@ -95,14 +95,14 @@ def calibrate(
 
 
 def _none_learned(count: int) -> Singles:
-    """(count, 0): the cosines of so many segments with learned labels, of which there are none."""
+    """Return the cosines (count, 0) of that many segments with learned labels: there are none."""
     return np.empty((count, 0), np.float32)
 
 
 def _likeliest(
     prototypes: Prototypes, trials: list[Trial], sharpness: str, unknown: str
 ) -> Prototypes:
-    """`prototypes` with the values of these two fields that make `trials` likeliest."""
+    """Return `prototypes` with the values of these two fields that make `trials` likeliest."""
 
     def cost(tried: Prototypes) -> float:
         return sum(trial.cost(tried) for trial in trials)
@@ -115,7 +115,7 @@ def _likeliest(
 
 
 def _metrics(posterior: Floats, of: Crops, column: Rows) -> dict[str, float]:
-    """Of segments with these posteriors (n, k + 2) and the columns that are right (n,)."""
+    """Return the metrics of segments with these posteriors (n, k + 2) and right columns (n,)."""
     # The posteriors of each label taught, and of any other thing.
     taught = posterior.shape[1] - 2
     unlabelled = posterior[:, taught:].sum(1, keepdims=True)
@@ -149,8 +149,8 @@ def _accuracy(prototypes: Prototypes, trials: Iterable[Trial]) -> float:
 def _encounters(
     embeddings: Singles, cosines: Singles, of: Crops
 ) -> tuple[list[Trial], list[Trial]]:
-    """In each town every unlabelled building is encountered once, in its largest segment; all its
-    other segments are then to be recognized, once with and once without that encounter.
+    """Make trials: every unlabelled building of a town is encountered once, in its largest segment;
+    all its others are to be recognized, once with and once without that encounter.
     """
     known = []
     unknown = []

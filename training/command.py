@@ -199,7 +199,7 @@ def road(
 
 @contextmanager
 def _needs_torch() -> Iterator[None]:
-    """Raises UsageError if an import fails because torch is not installed."""
+    """Raise UsageError if an import fails because torch is not installed."""
     try:
         yield
     except ModuleNotFoundError as error:

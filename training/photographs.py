@@ -58,8 +58,8 @@ def training_folders(camvid: Path) -> tuple[Path, Path]:
 
 
 def photographs(images: Path, labels: Path) -> Iterator[Photograph]:
-    """Return each image in the folder `images` with the label image of the same name in `labels`,
-    a PNG, by name.
+    """Yield each image in the folder `images` with the label image of the same name in `labels`, a
+    PNG, by name.
 
     Raises UsageError if a folder or file is missing, is no image, has another size than its label,
     or if no label has any road.

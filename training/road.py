@@ -74,7 +74,7 @@ def train_on_renderings(
 
 
 def _views(paths: Iterable[Path]) -> Iterator[Photograph]:
-    """All views of the towns in these files, with their road."""
+    """Yield all views of the towns in these files, with their road."""
     for path in paths:
         town = read(path)
         for image, surface in zip(town.left, town.surface, strict=True):
@@ -143,6 +143,6 @@ def _batches(
 
 
 def _shares(levels: Sequence[Bytes]) -> Singles:
-    """Levels of 0 to 255 as 0 to 1."""
+    """Convert levels of 0 to 255 to shares of 0 to 1."""
     stacked = np.stack(levels).astype(np.float32)
     return stacked / np.float32(255)

@@ -123,7 +123,7 @@ def target(label: Bytes) -> Singles:
 
 
 def _gaussian(count: int, middle: float, sd: float) -> Floats:
-    """A Gaussian of height 1 at 0, 1, and so on, (count,)."""
+    """Return a Gaussian of height 1 at 0, 1, and so on, (count,)."""
     squared = (np.arange(count) - middle) ** 2
     return np.asarray(np.exp(-squared / (2 * sd**2)))
 

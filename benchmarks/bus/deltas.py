@@ -109,7 +109,7 @@ def _cost_us(work: Callable[[], object]) -> float:
 
 
 def _commit(race: Race) -> None:
-    """The workspace's part: commit, encode, publish."""
+    """Run the workspace's part: commit, encode, publish."""
     ledger = Ledger({})
     operations = typical_operations()
 
@@ -135,7 +135,7 @@ def _commit(race: Race) -> None:
 
 
 def _replicate(race: Race) -> None:
-    """A replica's part: receive, validate, apply."""
+    """Run a replica's part: receive, validate, apply."""
     bus = ZenohBus(race.endpoint, AGENT)
     replica = Replica(snapshot_over(bus))
 
@@ -155,7 +155,7 @@ def _replicate(race: Race) -> None:
 
 
 def _put(race: Race) -> None:
-    """The peer: the same bytes put on a plain publisher."""
+    """Run the peer: put the same bytes on a plain publisher."""
     delta = Ledger({}).commit(0, 1, Phase.OBJECTS, typical_operations())
     payload = encode(delta)
     session = open_client(race.endpoint)
@@ -175,7 +175,7 @@ def _put(race: Race) -> None:
 
 
 def _receive(race: Race) -> None:
-    """The peer: the bytes received, nothing made of them."""
+    """Run the peer's receiver: receive the bytes, and make nothing of them."""
     session = open_client(race.endpoint)
     received = [0]
     complete = threading.Event()

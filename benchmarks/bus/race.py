@@ -35,7 +35,7 @@ class Race:
 
     @classmethod
     def at(cls, endpoint: str, number: int) -> Race:
-        """A race of `number` messages through the router at `endpoint`."""
+        """Make a race of `number` messages through the router at `endpoint`."""
         return cls(
             endpoint=endpoint,
             number=number,

@@ -59,12 +59,12 @@ class Route:
 
     @property
     def is_taught(self) -> bool:
-        """Whether the first drive came to the end."""
+        """Return whether the first drive came to the end."""
         return self.taught_away_m <= TAUGHT_WITHIN_M
 
     @property
     def is_guided(self) -> bool:
-        """Whether both drives did, the second without running into anything."""
+        """Return whether both drives came to the end, the second without running into anything."""
         return self.is_taught and self.away_m <= GUIDED_WITHIN_M and not self.collisions
 
 
@@ -89,7 +89,7 @@ class Driven:
 
     @property
     def is_over(self) -> bool:
-        """Whether it stands for good, or is late."""
+        """Return whether it stands for good, or is late."""
         return self.now_s - self._moved_s >= STOOD_S or self.now_s >= self.max_s
 
 
@@ -141,7 +141,7 @@ class Teacher(TownObserver):
         return goals
 
     def _is_near(self) -> bool:
-        """Whether the agent takes itself to be near the goal offered last, and there are more."""
+        """Decide whether the agent believes it is near the last goal offered, and more are left."""
         agent = self.graph.agent
         if agent is None or not 0 < self._offered < len(self._goals):
             return False
@@ -194,8 +194,8 @@ def drive_twice(seed: int) -> Route:
 
 
 def guidance(processes: int) -> Metrics:
-    """The share of routes whose end the agent comes to by guidance schemes alone, within
-    GUIDED_WITHIN_M and without running into anything, and what else there is to know of them.
+    """Measure the share of routes whose end the agent reaches by guidance schemes alone, within
+    GUIDED_WITHIN_M and without running into anything, and further figures of the routes.
     """
     driven = parallel_map(drive_twice, list(range(FIRST_SEED, FIRST_SEED + ROUTES)), processes)
     guided = [route for route in driven if route.is_guided]

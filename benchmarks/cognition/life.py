@@ -27,7 +27,7 @@ class Life:
 
     @property
     def ran_out(self) -> bool:
-        """Whether it ended for want of energy."""
+        """Return whether it ended because there was no energy left."""
         return self.lowest <= 0.0
 
 

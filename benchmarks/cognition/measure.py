@@ -67,8 +67,8 @@ def measure(setting: Setting) -> Metrics:
 
 
 def survival(processes: int, towns: int = TOWNS) -> Metrics:
-    """The shares of towns in which an agent's energy is never out, and how it went in the first one
-    with cameras.
+    """Measure the shares of towns in which an agent's energy never runs out, acting by itself and
+    at random, and its life in the first town with cameras.
     """
     stays = [Stay(FIRST_SEED, has_cameras=True)]
     for seed in range(FIRST_SEED, FIRST_SEED + towns):
@@ -88,7 +88,7 @@ def survival(processes: int, towns: int = TOWNS) -> Metrics:
 
 
 def lived(stay: Stay) -> Life:
-    """A life in a town."""
+    """Let an agent live in a town."""
     if stay.at_random:
         return live(stay.seed, LIFE_S, acting=RandomActions(stay.seed).module())
     return live(stay.seed, LIFE_S, has_cameras=stay.has_cameras)
@@ -99,8 +99,8 @@ def _survived(lives: list[Life]) -> float:
 
 
 def latencies(log: Path) -> Metrics:
-    """The median times from a view to the broadcast and to the action that it leads to, and how
-    many broadcasts a second there were. Of a log without any, NaN. Raises LogError.
+    """Measure the median times from a view to the broadcast and to the action that it leads to, and
+    how many broadcasts a second there were. They are NaN if a log has none. Raises LogError.
     """
     records = list(LogReader(log).records([BROADCAST, ACTION]))
     broadcasts = [record for record in records if record.topic is BROADCAST]
@@ -115,7 +115,7 @@ def latencies(log: Path) -> Metrics:
 
 
 def _median_ms(records: list[Record], topic: Topic) -> float:
-    """The median age of the view that messages of a topic derive from, as they were sent."""
+    """Return the median age of the view that messages of a topic derive from, as they were sent."""
     ages_ms = []
     for record in records:
         if record.topic is topic and record.envelope is not None:

@@ -23,7 +23,7 @@ class RandomActions:
         self._rng = np.random.default_rng([seed, 0xAC])
 
     def module(self) -> Module:
-        """The module to run in the place of `action`."""
+        """Return the module to run in the place of `action`."""
         return Module("action").on(topics.BEHAVIOURS, self.on_behaviours, emits=[topics.ACTION])
 
     def on_behaviours(self, behaviours: Behaviours) -> Action:

@@ -24,7 +24,7 @@ LAPS = 3.0
 
 
 def over_fused(processes: int) -> Metrics:
-    """`error_over_fused`, the mean over the towns of each one's ratio, and the errors behind it."""
+    """Measure `error_over_fused`, the mean of the towns' ratios, and the errors behind it."""
     rows = parallel_map(partial(mean_errors_m, laps=LAPS), TOWNS, processes)
     estimate_m, fused_m, wheels_m = np.array(rows).T
     ratios = estimate_m / fused_m
@@ -42,7 +42,7 @@ def over_fused(processes: int) -> Metrics:
 
 
 def mean_errors_m(town: int, laps: float) -> tuple[float, float, float]:
-    """Drive `laps` of the town of that seed: the mean distances from the truth of the estimate, of
+    """Drive `laps` of a seed's town; return the mean distances from the truth of the estimate, of
     fused self-motion alone and of wheels alone. Raises CogmapError if not all goals are reached.
     """
     choices = Choices(seed=town, laps=laps, lockstep=True, record=False)

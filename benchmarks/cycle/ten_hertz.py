@@ -20,8 +20,8 @@ SKIPPED = (topics.STEREO, topics.VIEW)
 
 
 def measure(folder: Path) -> Metrics:
-    """`cycle_p50_ms_10hz`, as it is and as it would be on a machine of UNIT_MS; `superseded_share`:
-    the share of the frames that no percepts came of, as a newer one was there first.
+    """Measure `cycle_p50_ms_10hz`, as it is and as it would be on a machine of UNIT_MS, and
+    `superseded_share`: the share of the frames that led to no percepts, as a newer one came first.
     """
     folder.mkdir()
     driven, watch = drive(folder, seconds=DRIVE_S, settings={"sim": {"frame_hz": FRAME_HZ}})
@@ -36,7 +36,7 @@ def measure(folder: Path) -> Metrics:
 
 
 def superseded_share(health: Mapping[str, Health]) -> float:
-    """By what each process counted: camera frames and views superseded, over the frames sensed."""
+    """Return camera frames and views superseded over frames sensed, by each process's counts."""
     frames = sum(each.emitted.get(topics.STEREO.name, 0) for each in health.values())
     superseded = 0
     for each in health.values():

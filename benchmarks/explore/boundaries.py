@@ -63,7 +63,7 @@ def boundary_score(window: Window, cell_m: float, boundaries_m: Floats) -> Bound
 
 
 def _middles(links: Indices, window: Window) -> Floats:
-    """(n, 2): the middles, in cells, of (n, 3) links: direction, i and j within the window."""
+    """Return the (n, 2) middles, in cells, of (n, 3) links: direction, i and j in the window."""
     cells = links[:, 1:] + window.origin
     middles: Floats = cells + LINK_OFFSETS[links[:, 0]] / 2
     return middles

@@ -30,7 +30,7 @@ class Drivable(NamedTuple):
 
     @classmethod
     def of(cls, town: TrueTown) -> Drivable:
-        """The streets of a town without its obstacles, and with barriers across closed ones."""
+        """Draw a town's streets without its obstacles, and with barriers across closed ones."""
         points_m = np.vstack([np.array(street.line_m, float) for street in town.streets])
         corner_m = points_m.min(axis=0) - MARGIN_M
         extent_m = np.ptp(points_m, axis=0) + 2 * MARGIN_M
@@ -61,7 +61,7 @@ class Drivable(NamedTuple):
         return cls(corner_m, np.asarray(is_free))
 
     def cell(self, x_m: float, y_m: float) -> int:
-        """The number of the free cell nearest to a position."""
+        """Return the number of the free cell nearest to a position."""
         cells = np.argwhere(self.is_free)
         centres_m = self.corner_m + cells * CELL_M
         away_m = np.hypot(*(centres_m - (x_m, y_m)).T)
@@ -71,21 +71,21 @@ class Drivable(NamedTuple):
         return int(i * height + j)
 
     def is_on(self, x_m: float, y_m: float) -> bool:
-        """Whether the robot's centre may be at a position."""
+        """Decide whether the robot's centre may be at a position."""
         j, i = _pixel((x_m, y_m), self.corner_m)
         width, height = self.is_free.shape
         is_inside = 0 <= i < width and 0 <= j < height
         return is_inside and bool(self.is_free[i, j])
 
     def lengths_from(self, x_m: float, y_m: float) -> Floats:
-        """(w, h): the length of the shortest route from a position, infinite where none leads."""
+        """Return the (w, h) shortest routes' lengths from a position, infinite if none leads."""
         start = self.cell(x_m, y_m)
         links = _links(self.is_free)
         lengths_m = np.asarray(dijkstra(links, indices=start), np.float64)
         return lengths_m.reshape(self.is_free.shape)
 
     def route_m(self, start_m: tuple[float, float], end_m: tuple[float, float]) -> Floats:
-        """(n, 2): the shortest route between two positions, of which one leads to the other."""
+        """Find the (n, 2) shortest route between two positions; there must be one."""
         links = _links(self.is_free)
         start = self.cell(*start_m)
         _, before = dijkstra(links, indices=start, return_predecessors=True)
@@ -100,13 +100,13 @@ class Drivable(NamedTuple):
         return positions_m
 
     def length_m(self, start_m: tuple[float, float], end_m: tuple[float, float]) -> float:
-        """The length of the shortest route between two positions; infinite where none leads."""
+        """Return the length of the shortest route between two positions; infinite without one."""
         lengths_m = self.lengths_from(*start_m)
         return float(lengths_m.ravel()[self.cell(*end_m)])
 
 
 def barrier_m(street: Street) -> Floats:
-    """(2, 2): the ends of the barrier that closes a street in its middle, beyond its kerbs."""
+    """Return the (2, 2) ends, beyond the kerbs, of the barrier that closes a street's middle."""
     start_m = np.array(street.line_m[0])
     end_m = np.array(street.line_m[-1])
     middle_m = (start_m + end_m) / 2
@@ -119,7 +119,7 @@ def barrier_m(street: Street) -> Floats:
 
 
 def _pixel(point_m: Iterable[float], corner_m: Floats) -> tuple[int, int]:
-    """A position as OpenCV takes it: the second index first."""
+    """Return a position as OpenCV takes it: the second index first."""
     x_m, y_m = point_m
     offset_m = np.array([x_m, y_m]) - corner_m
     cell = np.rint(offset_m / CELL_M)
@@ -129,7 +129,7 @@ def _pixel(point_m: Iterable[float], corner_m: Floats) -> tuple[int, int]:
 
 
 def _links(is_free: Booleans) -> sparse.csr_matrix:
-    """(n, n): the length of each move between free cells."""
+    """Return the (n, n) lengths of the moves between free cells."""
     number = np.arange(is_free.size).reshape(is_free.shape)
     rows: list[Indices] = []
     columns: list[Indices] = []

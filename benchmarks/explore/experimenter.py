@@ -55,7 +55,7 @@ class Experimenter(TownObserver):
 
     @property
     def is_complete(self) -> bool:
-        """Whether all goals were reached or given up."""
+        """Return whether all goals were reached or given up."""
         has_explored = not math.isnan(self.explored_share)
         return has_explored and len(self.trials) >= self._goals and self._trial is None
 
@@ -93,7 +93,7 @@ class Experimenter(TownObserver):
         return [StreetClosure(street=street_name, closed=False)]
 
     def _believed(self, town: TrueTown) -> TrueTown:
-        """The town with the streets closed of which an agent cannot know that they are open."""
+        """Return the town with those streets closed that an agent cannot know to be open."""
         return functools.reduce(closed_as, sorted(self._opened), town)
 
     def _begin(self, pose: TruePose, town: TrueTown) -> Offer:

@@ -20,8 +20,8 @@ CORNERS = np.array([(1, 1), (-1, 1), (-1, -1), (1, -1)])
 
 
 def road_m(graph: Graph, start: Floats) -> Floats:
-    """(n, 2): the place nodes that the agent has seen as road, in the true frame; `start` is the
-    true pose (3,) where the agent's own frame begins.
+    """Return the (n, 2) place nodes that the agent has seen as road, in the true frame; `start` is
+    the true pose (3,) where the agent's own frame begins.
     """
     extent = graph.places.extent(ROOT_MAP)
     window = graph.places.window(ROOT_MAP, [PlaceColumn.ROAD], extent)
@@ -32,7 +32,7 @@ def road_m(graph: Graph, start: Floats) -> Floats:
 
 
 def explored_share(graph: Graph, town: TrueTown, start: Floats) -> float:
-    """The share of the streets' centre lines that is on the map as road, within SEEN_WITHIN_M."""
+    """Return the share of street centre lines that the map has as road, within SEEN_WITHIN_M."""
     known_m = road_m(graph, start)
     if not len(known_m):
         return 0.0
@@ -43,7 +43,7 @@ def explored_share(graph: Graph, town: TrueTown, start: Floats) -> float:
 
 
 def score_boundaries(graph: Graph, town: TrueTown, start: Floats) -> BoundaryScore:
-    """How well the links that are cut agree with the town's kerbs, walls and obstacles."""
+    """Score how well the links that are cut agree with the town's kerbs, walls and obstacles."""
     kerbs_m = np.asarray(town.kerbs_m.numpy(), np.float64)
     walls_m = np.asarray(town.walls_m.numpy(), np.float64)
     segments_m = [kerbs_m, walls_m]

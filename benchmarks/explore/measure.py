@@ -66,7 +66,7 @@ class Town:
 
 
 def visit(chosen: Visit) -> Town:
-    """Explore one town, then drive to goals in it. Raises CogmapError where a module rejected a
+    """Explore one town, then drive to goals in it. Raises CogmapError if a module rejected a
     message.
     """
     configured = town_sections(chosen.seed, chosen.has_cameras)
@@ -106,7 +106,7 @@ def measure(setting: Setting, *, towns: int = TOWNS) -> Metrics:
 
 
 def metrics(towns: list[Town]) -> Metrics:
-    """The means over towns, and over all drives that reached their goal."""
+    """Average over towns, and over all drives that reached their goal."""
     trials = [trial for town in towns for trial in town.trials]
     reached = [trial for trial in trials if trial.driven_m is not None]
     shares = [town.explored_share for town in towns]
@@ -130,5 +130,5 @@ def _mean_over_shortest(trials: list[Trial]) -> float:
 
 
 def _mean(ratios: list[float]) -> float:
-    """NaN of none."""
+    """Return the mean of some ratios, NaN of none."""
     return float(np.mean(ratios)) if ratios else float("nan")

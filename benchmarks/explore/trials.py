@@ -50,18 +50,18 @@ class Trial:
 
     @property
     def limit_ns(self) -> int:
-        """The time at which the drive counts as failed."""
+        """Return the time at which the drive counts as failed."""
         limit_s = GRACE_S + 3 * self.shortest_m / SLOWEST_M_S
         return self.began_ns + round(limit_s * 1e9)
 
     @property
     def over_shortest(self) -> float:
-        """The distance driven over that of the shortest route."""
+        """Return the distance driven over that of the shortest route."""
         assert self.driven_m is not None
         return self.driven_m / self.shortest_m
 
     def close(self, closure: Closure) -> None:
-        """The street on the way is closed."""
+        """Note that the street on the way is closed."""
         self.closed = closure.street
         self.shortest_m = closure.shortest_m
         self.unwarned_m = closure.unwarned_m
@@ -76,7 +76,7 @@ class Closure(NamedTuple):
 
 
 def centre_lines_m(town: TrueTown) -> Floats:
-    """(n, 2): points of the streets' centre lines, LINE_STEP_M apart."""
+    """Return (n, 2) points of the streets' centre lines, LINE_STEP_M apart."""
     lines = []
     for street in town.streets:
         line_m = np.array(street.line_m, float)
@@ -86,7 +86,7 @@ def centre_lines_m(town: TrueTown) -> Floats:
 
 
 def closed_as(town: TrueTown, street: str) -> TrueTown:
-    """The town with that street closed too."""
+    """Return the town with that street closed too."""
     streets = []
     for each in town.streets:
         is_closed = each.closed or each.name == street
@@ -98,8 +98,8 @@ def closed_as(town: TrueTown, street: str) -> TrueTown:
 def draw_goal(
     rng: np.random.Generator, town: TrueTown, drivable: Drivable, here_m: Point
 ) -> tuple[Point, float]:
-    """A point of the streets that can be reached from `here_m`, and the length of the shortest
-    route to it, at least MIN_AWAY_M.
+    """Draw a point of the streets that can be reached from `here_m`. Return it, and the length of
+    the shortest route to it, at least MIN_AWAY_M.
     """
     lengths_m = drivable.lengths_from(*here_m)
     for point_m in rng.permutation(centre_lines_m(town)):
@@ -112,8 +112,8 @@ def draw_goal(
 
 
 def believed_m(town: TrueTown, believed: TrueTown, start_m: Point, goal_m: Point) -> float:
-    """The length of the shortest route in the town as an agent believes it to be; where that has
-    none, in the town as it is.
+    """Return the length of the shortest route in the town as an agent believes it to be; if that
+    has none, in the town as it is.
     """
     length_m = Drivable.of(believed).length_m(start_m, goal_m)
     if math.isfinite(length_m):
@@ -123,7 +123,7 @@ def believed_m(town: TrueTown, believed: TrueTown, start_m: Point, goal_m: Point
 
 
 def sees_barrier(street: Street, here_m: Floats) -> bool:
-    """Whether an agent at (2,) `here_m` sees if a barrier closes a street: it is within SIGHT_M."""
+    """Decide whether an agent at (2,) `here_m` would see a street's barrier: within SIGHT_M."""
     (foot_m,) = nearest_on_line(barrier_m(street), here_m[None]).foot_m
     return math.dist(foot_m, here_m) <= SIGHT_M
 
@@ -135,10 +135,10 @@ def street_to_close(
     goal_m: Point,
     believed: TrueTown | None = None,
 ) -> Closure | None:
-    """A street ahead that the (n, 2) route passes, without which the goal can still be reached;
-    None where there is none. The goal is not at its barrier, where it could be reached from both
-    sides; nor is it a square, which a barrier through its middle does not close. What an unwarned
-    agent drives is by the town as it is `believed` to be, if not as it is.
+    """Draw a street ahead that the (n, 2) route passes, without which the goal can still be
+    reached; return None if there is none. The goal is not at its barrier, where it could be reached
+    from both sides. It is no square, which a barrier through its middle does not close. An unwarned
+    agent drives by the town as it is `believed` to be, or else as it is.
     """
     start_x_m, start_y_m = route_m[0].tolist()
     start_m = (start_x_m, start_y_m)
@@ -172,8 +172,8 @@ def street_to_close(
 def unwarned_m(
     known_m: Floats, barrier_ends_m: Floats, closed: TrueTown, believed: TrueTown
 ) -> float:
-    """The length of a drive along (n, 2) `known_m` as far as its barrier (2, 2) is within SIGHT_M,
-    and from there as `believed_m` of the town as it is, with that street closed.
+    """Return the length of a drive along (n, 2) `known_m` until its barrier (2, 2) is within
+    SIGHT_M, and from there by `believed_m`, in the town as it is with that street `closed`.
     """
     feet_m = nearest_on_line(barrier_ends_m, known_m).foot_m
     is_seen = np.hypot(*(known_m - feet_m).T) <= SIGHT_M

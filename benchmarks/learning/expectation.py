@@ -70,7 +70,7 @@ class Surprise:
     views_ns: list[int] = field(default_factory=list)
 
     def note(self, stamp_ns: int, is_noticeable: bool) -> None:
-        """It is noticeable in a view, or it is not."""
+        """Note whether it is noticeable in a view."""
         if self.onset_ns is not None:
             return
         self.views_ns = [*self.views_ns, stamp_ns] if is_noticeable else []
@@ -79,7 +79,7 @@ class Surprise:
 
     @property
     def was_conscious(self) -> bool:
-        """Whether it was conscious in time."""
+        """Return whether it was conscious in time."""
         if self.onset_ns is None or self.conscious_ns is None:
             return False
         return self.conscious_ns - self.onset_ns <= CONSCIOUS_WITHIN_S * 1e9
@@ -95,7 +95,7 @@ class Surprises:
 
 
 def measure(processes: int) -> Metrics:
-    """The share of surprises that were conscious in time, over so many towns."""
+    """Measure the share of surprises that were conscious in time, over so many towns."""
     found = parallel_map(surprises_in, list(range(FIRST_SEED, FIRST_SEED + TOWNS)), processes)
     buildings = [each for town in found for each in town.buildings]
     streets = [each for town in found for each in town.streets]
@@ -148,7 +148,7 @@ class Judge(TownObserver):
 
     @property
     def surprises(self) -> Surprises:
-        """Those that could be noticed."""
+        """Return the surprises that could be noticed."""
         buildings = [each for each in self._buildings.values() if each.onset_ns is not None]
         streets = [each for each in self._streets.values() if each.onset_ns is not None]
         return Surprises(buildings, streets, self._false)
@@ -172,7 +172,7 @@ class Judge(TownObserver):
         return self._lead(true.stamp_ns)
 
     def _begin(self) -> None:
-        """Give as goals the buildings, gone from now on, that the agent's map has."""
+        """Give as goals those buildings of the agent's map that are gone from now on."""
         self._has_begun = True
         for number in self._removed:
             plot = self._place.plots[number]
@@ -221,7 +221,7 @@ class Judge(TownObserver):
         self._false += 1
 
     def _lead(self, stamp_ns: int) -> list[Message]:
-        """Give the agent the next goal where it is at this one, or has had it for long enough."""
+        """Give the agent the next goal if it is at this one, or has had it for long enough."""
         if not self._goals:
             self.is_complete = True
             return []
@@ -261,7 +261,7 @@ class Judge(TownObserver):
         return [StreetClosure(street=closure.street, closed=True)]
 
     def _in_truth(self, x_m: float, y_m: float) -> Point:
-        """A position of the agent's map in the true frame."""
+        """Transform a position of the agent's map to the true frame."""
         true_x_m, true_y_m = self.to_truth(np.array([[x_m, y_m]]))[0].tolist()
         return true_x_m, true_y_m
 

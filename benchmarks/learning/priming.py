@@ -56,7 +56,7 @@ class Naming:
 
 
 def measure(processes: int) -> Metrics:
-    """The gain by priming on ambiguous views, and on all."""
+    """Measure the gain by priming on ambiguous views, and on all."""
     found: list[Naming] = []
     for namings in parallel_map(namings_in, list(SEEDS), processes):
         found += namings
@@ -155,7 +155,7 @@ def _compared(
     bare: Sequence[Percept],
     primed: Sequence[Percept],
 ) -> Iterator[Naming]:
-    """The buildings that the extended PAM without priming has a percept of."""
+    """Yield the buildings that the extended PAM without priming has a percept of."""
     kinds = [plot.kind.name for plot in place.plots]
     range_m = side_and_range(place, scene.pose)[:, 1].tolist()
     without = sight(claims(bare, scene.label.shape), scene.label, kinds, range_m)

@@ -28,8 +28,8 @@ class Visibility:
             self._barriers_m[name] = outlines([barrier.solid])
 
     def building(self, at: Floats, number: int) -> bool:
-        """Whether at least half of a building would be seen from x, y, heading: its middle is in
-        the image, and others hide no more than half of it.
+        """Decide whether at least half of a building would be seen from x, y, heading: its middle
+        is in the image, and others hide no more than half of it.
         """
         plot = self._plots[number]
         direction_rad = math.atan2(plot.y_m - at[1], plot.x_m - at[0])
@@ -47,7 +47,7 @@ class Visibility:
         return columns >= needed
 
     def barrier(self, at: Floats, street: str, reach_m: float) -> bool:
-        """Whether a barrier would be seen that closes a street, within so many metres."""
+        """Decide whether a barrier that closes a street would be seen, within so many metres."""
         barrier_m = self._barriers_m[street]
         middle_m = barrier_m.reshape(-1, 2).mean(axis=0)
         if np.hypot(*(middle_m - at[:2])) > reach_m:

@@ -27,7 +27,7 @@ class Delay:
 
     @property
     def lag_s(self) -> float:
-        """0 until there are MIN_PAIRS of observations."""
+        """Return the lag that agrees best, 0 until there are MIN_PAIRS of observations."""
         if self._pairs < MIN_PAIRS:
             return 0.0
 

@@ -197,18 +197,18 @@ class LocalizationLoop:
 
     @property
     def pose(self) -> Floats:
-        """(3,): the mean of the self's samples."""
+        """Return the mean (3,) of the self's samples."""
         agent = self._agent
         return np.array([agent.x_m, agent.y_m, agent.heading_rad])
 
     @property
     def odometry(self) -> Floats:
-        """(3,): the agent's pose by path integration alone."""
+        """Return the agent's pose (3,) by path integration alone."""
         return self._agent.odometry.pose()
 
     @property
     def path(self) -> Floats:
-        """(n, 11) rows of the path on the map now, see PathColumn."""
+        """Return (n, 11) rows of the path on the map now, see PathColumn."""
         return rows_of(self._graph.of_kind(PathSegment))
 
     @property

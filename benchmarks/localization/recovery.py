@@ -31,7 +31,7 @@ class Recovery(NamedTuple):
 
 
 def evaluate_recovery(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics:
-    """The mean and the worst of a robot's recoveries, on a map of surveyed landmarks.
+    """Measure the mean and the worst of a robot's recoveries, on a map of surveyed landmarks.
 
     The cuts are spread over its log. Nothing in them reaches it: neither that it moved nor what it
     saw.
@@ -49,7 +49,7 @@ def evaluate_recovery(robot: Robot, landmarks: dict[int, tuple[float, float]]) -
 
 
 def recovery_of(since_s: Floats, errors_m: Floats) -> Recovery:
-    """The recovery from (n,) errors, in order of their times since the cut's end."""
+    """Find the recovery in (n,) errors, in order of their times since the cut's end."""
     is_over = errors_m > FOUND_M
     over_s = np.append(since_s[is_over], np.inf)
     next_over_s = over_s[np.searchsorted(over_s, since_s)]
@@ -64,8 +64,8 @@ def recovery_of(since_s: Floats, errors_m: Floats) -> Recovery:
 
 
 def _recovery(robot: Robot, landmarks: dict[int, tuple[float, float]], cut_s: float) -> Recovery:
-    """The recovery from a cut that begins `cut_s` after the log; the robot knows where it is a
-    while before.
+    """Measure the recovery from a cut that begins `cut_s` after the log begins; the robot knows
+    where it is a while before.
     """
     begin_s = float(robot.odometry[0, 0])
     resumed_s = begin_s + cut_s + CUT_S

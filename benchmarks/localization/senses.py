@@ -40,7 +40,7 @@ def label_of(subject: int) -> str:
 
 
 def seen(label: str, bearing_rad: float, range_m: float) -> Percept:
-    """A percept with the benchmark's noise: 3 % of the distance, as the paper's, and 1°."""
+    """Make a percept with the benchmark's noise: 3 % of the distance, as the paper's, and 1°."""
     return Percept(
         label=label,
         activation=1.0,
@@ -57,7 +57,7 @@ def seen(label: str, bearing_rad: float, range_m: float) -> Percept:
 
 
 def percept_of(row: Floats) -> Percept:
-    """An observation (stamp, subject, range, bearing) as a percept.
+    """Make a percept of an observation (stamp, subject, range, bearing).
 
     The range of a set is computed from the height of an upright barcode in the image: it is the
     depth along the camera's axis.
@@ -88,7 +88,7 @@ class Wheels:
         return heading
 
     def rows(self, since_s: float, until_s: float) -> Floats:
-        """(n, 5) rows of self-motion, one for each time that the command changed in between."""
+        """Return (n, 5) rows of self-motion, one for each change of the command in between."""
         begin_s = max(since_s, float(self._stamps[0]))
         if until_s <= begin_s:
             return np.empty((0, 5))
@@ -116,7 +116,7 @@ class Wheels:
 
 
 def moments(robot: Robot, skipped_s: tuple[float, float] | None = None) -> Iterator[Moment]:
-    """A robot's log in order of time, observations of other robots left out.
+    """Yield a robot's log in order of time, without observations of other robots.
 
     Between `skipped_s`, seconds after its start, nothing reaches it: it is kidnapped.
     """

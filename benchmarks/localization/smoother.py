@@ -83,7 +83,7 @@ class Problem:
                 self._start.insert(landmark, self._pose.transformFrom(range_m * direction))
 
     def solve(self) -> Floats:
-        """(n, 3) poses, without the start."""
+        """Solve for the (n, 3) poses, without the start."""
         parameters = self._gtsam.LevenbergMarquardtParams()
         parameters.setMaxIterations(STEPS)
         optimizer = self._gtsam.LevenbergMarquardtOptimizer(self._graph, self._start, parameters)
@@ -96,7 +96,7 @@ class Problem:
 
 
 def _step(rows: Floats) -> tuple[Floats, Floats]:
-    """The pose that (n, 5) rows of motion lead to from 0, and its standard deviations."""
+    """Compute the pose that (n, 5) rows of motion lead to from 0, and its standard deviations."""
     speed, turn_rate, dt, speed_sd, turn_rate_sd = rows.T
     turn_rad = turn_rate * dt
     middle_rad = np.cumsum(turn_rad) - turn_rad / 2

@@ -84,7 +84,7 @@ class Circle:
         self._loop.close()
 
     def _percepts(self) -> list[Percept]:
-        """Some of the nearest landmarks, as many as are drawn, up to IN_VIEW."""
+        """Draw percepts of some of the nearest landmarks, up to IN_VIEW."""
         offsets_m = self._near_m - self._pose[:2]
         nearest = np.argsort(np.hypot(*offsets_m.T))
         count = self._rng.integers(1, IN_VIEW + 1)
@@ -103,13 +103,13 @@ class Circle:
 
 
 def _drive_both(small: Circle, large: Circle) -> tuple[list[Times], Times]:
-    """LARGE_EVERY updates on the small map, and one on the large."""
+    """Measure LARGE_EVERY updates on the small map, and one on the large."""
     small_s = [small.update_s() for _ in range(LARGE_EVERY)]
     return small_s, large.update_s()
 
 
 def measure() -> Metrics:
-    """CPU times of the worker on both maps in turn; the ratio is of medians.
+    """Measure CPU times of the worker on both maps in turn; the ratio is of medians.
 
     `update_ms_*` is of the localization codelet alone, on the small map; the ratio is of all tasks
     of a cycle. Linear algebra has one thread, as in processes of the system.

@@ -22,7 +22,7 @@ class Truth:
 
     @classmethod
     def at(cls, robot: Robot, stamps_s: Floats) -> Truth:
-        """The truth at (n,) `stamps_s`, interpolated between the times that it was captured at."""
+        """Interpolate the truth at (n,) `stamps_s`, between the times that it was captured at."""
         captured_s, x_m, y_m, heading_rad = robot.truth.T
         columns = []
         for column in (x_m, y_m, np.unwrap(heading_rad)):
@@ -36,23 +36,23 @@ class Truth:
         return cls(np.column_stack(columns), is_known)
 
     def only(self, chosen: Booleans) -> Truth:
-        """The truth as known at the (n,) `chosen` times alone."""
+        """Return the truth as known at the (n,) `chosen` times alone."""
         return replace(self, is_known=self.is_known & chosen)
 
     def errors_m(self, path: Floats) -> Floats:
-        """Distances of a (n, 3) `path` from the truth where that is known, (known,)."""
+        """Return distances of a (n, 3) `path` from the truth where that is known, (known,)."""
         offset_m = self._offset_m(path)
         distances_m: Floats = np.hypot(offset_m[:, 0], offset_m[:, 1])
         return distances_m
 
     def rmse_m(self, path: Floats) -> float:
-        """Root mean square distance of a (n, 3) `path` from the truth where that is known."""
+        """Return a (n, 3) `path`'s root mean square distance from the truth where that is known."""
         offset_m = self._offset_m(path)
         squared_m2 = np.square(offset_m).sum(axis=1)
         return float(np.sqrt(squared_m2.mean()))
 
     def aligned_error_m(self, path: Floats) -> float:
-        """The same once the path is aligned with the truth, as one in a frame of its own."""
+        """Return the same once the path, in a frame of its own, is aligned with the truth."""
         positions_m = path[self.is_known, :2]
         return trajectory_error_m(positions_m, self._positions_m)
 

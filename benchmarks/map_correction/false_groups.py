@@ -96,7 +96,7 @@ def _kept(groups: Groups, graph: PoseGraph) -> tuple[Booleans, Floats]:
 def false_closures(
     graph: PoseGraph, count: int, size: int, rng: np.random.Generator
 ) -> Constraints:
-    """`count` false closures in groups of `size` that agree, as certain as those of the graph."""
+    """Draw `count` false closures in groups of `size` that agree, as certain as the graph's own."""
     path = integrate(np.zeros(3), graph.steps.measurement)
     rows: list[tuple[int, int, Floats]] = []
     while len(rows) < count:

@@ -112,7 +112,7 @@ def cost_ratio(found: float, reference: float) -> float:
 
 
 def _correct_positions(graph: PoseGraph) -> tuple[Floats, Metrics]:
-    """By the paper's rule, positions only, against exact least squares."""
+    """Correct positions only, by the paper's rule, against exact least squares."""
     took_s, found = timed(partial(close_loops, graph))
     constraints = graph.constraints
     known = displacements(graph.poses, constraints)
@@ -128,7 +128,7 @@ def _correct_positions(graph: PoseGraph) -> tuple[Floats, Metrics]:
 
 
 def _correct_headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, Metrics]:
-    """Both from the same poses, each once to warm up, then in turn; each one's median time."""
+    """Solve both ways from the same poses: once to warm up, then in turn; take the median times."""
     by_qr = peer.gives_up()
     poses = optimize(graph)
     peers_poses = peer.poses(peer.solve())
@@ -156,7 +156,7 @@ def _correct_headings(graph: PoseGraph, peer: Gtsam) -> tuple[Floats, Floats, Me
 
 
 def _add_closures(graph: PoseGraph, batch_cost: float) -> Metrics:
-    """Closures left out at random are added one at a time.
+    """Add closures that were left out at random, one at a time.
 
     Relinearizing, which happens between two closures, is timed apart.
     """

@@ -74,16 +74,16 @@ class Gtsam:
             self._graph.add(self._gtsam.BetweenFactorPose2(i, j, between, noise))
 
     def solve(self) -> Any:
-        """Levenberg and Marquardt's method, with gtsam's defaults; `poses` reads the result."""
+        """Solve by Levenberg and Marquardt's method, with gtsam's defaults, for `poses` to read."""
         optimizer = self._gtsam.LevenbergMarquardtOptimizer(
             self._graph, self._start, self._parameters
         )
         return optimizer.optimize()
 
     def gives_up(self) -> bool:
-        """Whether gtsam's default, factoring by Cholesky, leaves all as it was.
+        """Decide whether gtsam's default, factoring by Cholesky, leaves all as it was.
 
-        `solve` factors by QR from then on.
+        If so, `solve` factors by QR from then on.
         """
         error = self._graph.error(self.solve())
         gives_up = bool(error >= self._graph.error(self._start))

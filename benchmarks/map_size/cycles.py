@@ -36,7 +36,7 @@ class Cycles(NamedTuple):
 
 
 def sections() -> Sections:
-    """Percept-level sensing along a street with buildings on both sides, in lockstep."""
+    """Configure percept-level sensing along a street with buildings on both sides, in lockstep."""
     landmarks = []
     for number, x_m in enumerate(np.arange(0.0, LENGTH_M, APART_M).tolist()):
         is_left = number % 2

@@ -41,7 +41,7 @@ class Joined(NamedTuple):
 
 
 def replica_memory_mb(learned: Snapshot) -> float:
-    """By how much a process grows that decodes a snapshot, loads it and releases the message."""
+    """Measure how a process grows that decodes a snapshot, loads it, and releases the message."""
     context = get_context("spawn")
     ours, theirs = context.Pipe()
     process = context.Process(target=_hold, args=(theirs,))
@@ -56,7 +56,7 @@ def replica_memory_mb(learned: Snapshot) -> float:
 
 
 def _hold(connection: Connection) -> None:
-    """The process of the replica."""
+    """Run the process of the replica."""
     payload = connection.recv_bytes()
     before = _resident_bytes() - len(payload)
 
@@ -72,7 +72,7 @@ def _hold(connection: Connection) -> None:
 
 
 def _resident_bytes() -> int:
-    """The memory of this process."""
+    """Return the memory of this process."""
     memory = psutil.Process().memory_info()
     return int(memory.rss)
 
@@ -129,7 +129,7 @@ def join(learned: Snapshot) -> Joined:
 
 
 def _work(endpoint: str, connection: Connection) -> None:
-    """The process of the worker, which ends once a handler has answered something."""
+    """Run the process of the worker, which ends once a handler has answered something."""
     module = registry.build("codelets", sections(), "codelets-late")
     answered = threading.Event()
 

@@ -74,7 +74,7 @@ def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
 
 
 def _objects(number: int, cycle: int, rng: np.random.Generator) -> list[Object]:
-    """Buildings, no number of one quite that of another."""
+    """Make buildings, none with quite the same numbers as another."""
     samples = Config().landmark_samples
     radius_m = CLEAR_M + 2 * np.sqrt(number)
     positions_m = rng.uniform(-radius_m, radius_m, (number, 2))
@@ -107,7 +107,7 @@ def _objects(number: int, cycle: int, rng: np.random.Generator) -> list[Object]:
 
 
 def _sub_maps(objects: list[Object]) -> tuple[list[Map], Links]:
-    """Sub-maps of the objects in each of many squares, and which objects are within them."""
+    """Make a sub-map of the objects in each of many squares, and link each object to its own."""
     positions_m = np.array([(node.x_m, node.y_m) for node in objects]).reshape(-1, 2)
     squares = np.floor(positions_m / SUB_MAP_SIDE_M)
     occupied, numbers = np.unique(squares, axis=0, return_inverse=True)
@@ -139,7 +139,7 @@ def _sub_maps(objects: list[Object]) -> tuple[list[Map], Links]:
 
 
 def _tiles(places: int, rng: np.random.Generator) -> list[PlaceTile]:
-    """Tiles in rows of a square, that the agent is in the middle of."""
+    """Make tiles in rows of a square that has the agent in its middle."""
     shape = (TILE_SIDE, TILE_SIDE)
     number = math.ceil(places / math.prod(shape))
     side = math.ceil(math.sqrt(number))

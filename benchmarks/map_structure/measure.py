@@ -104,7 +104,7 @@ def sub_maps_of(made: Town, config: Config, labels: Indices | None = None) -> Su
 
 
 def _settled(made: Town, config: Config) -> Indices:
-    """(n,): the labels of a town's objects, clustered at once."""
+    """Cluster a town's objects at once, and return their labels (n,)."""
     sub_maps = sub_maps_of(made, config)
     sub_maps.settle()
     return sub_maps.labels
@@ -151,8 +151,8 @@ def adjusted_rand_index(truth: Indices, labels: Indices) -> float:
 
 
 def gaussian_mixture(positions_m: Floats) -> Indices:
-    """(n,): the labels that a Gaussian mixture with a Dirichlet-process prior gives to positions,
-    (n, 2), by variational inference.
+    """Return the (n,) labels that a Gaussian mixture with a Dirichlet-process prior gives to
+    positions, (n, 2), by variational inference.
     """
     mixture: Any = scikit_learn().mixture
     model = mixture.BayesianGaussianMixture(

@@ -124,8 +124,8 @@ def town(seed: int, districts: int | None = None, plot_m: float = PLOT_M) -> Tow
 
 
 def _borders(sites_m: Floats, side_m: float) -> list[_Border]:
-    """The borders between the cells of (p, 2) sites in a square; mirrored sites end them at its
-    sides.
+    """Find the borders between the cells of (p, 2) sites in a square; mirrored sites end them at
+    its sides.
     """
     mirrored_m = [sites_m]
     for axis in (0, 1):
@@ -145,7 +145,7 @@ def _borders(sites_m: Floats, side_m: float) -> list[_Border]:
 
 
 def _grown(plots: int, borders: list[_Border], districts: int, rng: np.random.Generator) -> Indices:
-    """(p,): the district of each plot.
+    """Grow the districts, and return the one of each plot, (p,).
 
     From one plot each, districts annex free neighbours, in turns drawn by their speeds.
     """
@@ -174,7 +174,7 @@ def _grown(plots: int, borders: list[_Border], districts: int, rng: np.random.Ge
 
 
 def _boundaries(plan: _Plan, rng: np.random.Generator) -> Floats:
-    """(m, 2, 2): the boundaries of most borders between districts, and of a few inside them."""
+    """Draw the (m, 2, 2) boundaries of most borders between districts, and of a few inside them."""
     by_pair: dict[tuple[int, int], list[Floats]] = {}
     segments_m = [np.zeros((0, 2, 2))]
 
@@ -193,7 +193,7 @@ def _boundaries(plan: _Plan, rng: np.random.Generator) -> Floats:
 
 
 def _with_gaps(borders_m: list[Floats], rng: np.random.Generator) -> Floats:
-    """(k, 2, 2): a boundary along straight borders, slightly bent, with a gap at each crossing."""
+    """Draw a (k, 2, 2) boundary along straight borders, a bit bent, with a gap at each crossing."""
     pieces_m = np.concatenate([_bent(ends_m, rng) for ends_m in borders_m])
     lengths_m = np.hypot(*(pieces_m[:, 1] - pieces_m[:, 0]).T)
     along_m = np.cumsum(lengths_m) - lengths_m / 2
@@ -209,7 +209,7 @@ def _with_gaps(borders_m: list[Floats], rng: np.random.Generator) -> Floats:
 
 
 def _bent(ends_m: Floats, rng: np.random.Generator) -> Floats:
-    """(k, 2, 2): pieces of a straight border whose inner corners lie a little aside."""
+    """Cut a straight border into (k, 2, 2) pieces whose inner corners lie a little aside."""
     along = ends_m[1] - ends_m[0]
     length_m = float(np.hypot(*along))
     count = max(1, round(length_m / PIECE_M))
@@ -222,8 +222,8 @@ def _bent(ends_m: Floats, rng: np.random.Generator) -> Floats:
 
 
 def _objects(plan: _Plan, boundaries_m: Floats, rng: np.random.Generator) -> tuple[Floats, Indices]:
-    """(n, 2) positions and (n,) districts: each district has objects at a spacing of its own, some
-    way from every boundary. A district that has room for few stays empty.
+    """Draw (n, 2) positions and (n,) districts: each district has objects at a spacing of its own,
+    some way from every boundary. A district that has room for few stays empty.
     """
     plots = cKDTree(plan.sites_m)
     low_m = plan.sites_m.min(axis=0)
@@ -269,7 +269,7 @@ class _Drift:
     phases_rad: Floats
 
     def __call__(self, points_m: Floats) -> Floats:
-        """(k, 2): where points appear."""
+        """Return where points appear, (k, 2)."""
         angles_rad = points_m @ self.waves_per_m.T + self.phases_rad
         drifted_m: Floats = points_m + np.sin(angles_rad) @ self.amplitudes_m
         return drifted_m

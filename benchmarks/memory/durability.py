@@ -116,7 +116,7 @@ def open_damaged(folder: Path, stores: int) -> Damaged:
 
 
 def has_hot_journal(path: Path) -> bool:
-    """Whether pages of an unfinished transaction may be in the database at `path`.
+    """Decide whether pages of an unfinished transaction may be in the database at `path`.
 
     They may be if its journal's head does not begin with zero (sqlite.org/fileformat2, section 3).
     """
@@ -129,7 +129,7 @@ def has_hot_journal(path: Path) -> bool:
 
 
 def _written_until_killed(path: Path, first: int, random: Random) -> list[int]:
-    """The numbers that a writer acknowledged, before a kill at a random moment and in its pipe."""
+    """Kill a writer at a random moment; return the numbers acknowledged, those in its pipe too."""
     program = [sys.executable, "-m", "benchmarks.memory.writer", str(path.absolute()), str(first)]
     with subprocess.Popen(program, stdout=subprocess.PIPE, text=True, cwd=_REPOSITORY) as writer:
         assert writer.stdout is not None

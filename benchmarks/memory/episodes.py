@@ -60,7 +60,7 @@ def measure(seed: int) -> Metrics:
 
 
 def _episodes(count: int, rng: np.random.Generator) -> dict[int, TransientEpisode]:
-    """Episodes at random places of a town, by number."""
+    """Draw episodes at random places of a town, by number."""
     episodes = {}
     path: list[tuple[float, float]] = []
     for number in range(1, 1 + count):

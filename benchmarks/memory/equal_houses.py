@@ -118,13 +118,13 @@ def recalled_after(walk: Walk, stored: Sequence[RememberedMap]) -> tuple[int, Fl
 
 
 def is_right(pose: Floats, first: Walk, second: Walk) -> bool:
-    """Whether that is the pose of the second walk's frame in that of the first one."""
+    """Decide whether that is the pose of the second walk's frame in that of the first one."""
     x_m, y_m, turn_rad = relative(relative(first.frame, second.frame), pose).tolist()
     return math.hypot(x_m, y_m) <= RIGHT_WITHIN_M and abs(turn_rad) <= RIGHT_WITHIN_RAD
 
 
 def _houses(rng: np.random.Generator, lines_m: Floats) -> tuple[list[str], Floats]:
-    """Houses on both sides of each block of the streets, of mostly one look on each side."""
+    """Draw houses on both sides of each block of the streets, of mostly one look on each side."""
     looks: list[str] = []
     at_m: list[Floats] = []
     for axis in (0, 1):
@@ -145,7 +145,7 @@ def _houses(rng: np.random.Generator, lines_m: Floats) -> tuple[list[str], Float
 def _walk(
     rng: np.random.Generator, lines_m: Floats, blocks: int, looks: list[str], at_m: Floats
 ) -> Walk:
-    """A walk at random that turns back only at the border, seen from a frame of its own."""
+    """Draw a walk at random that turns back only at the border, seen from a frame of its own."""
     way_m = _way(rng, lines_m, blocks)
     away_m = np.hypot(*(at_m[:, None] - way_m).transpose(2, 0, 1))
     is_seen = away_m.min(axis=1) <= SEEN_M
@@ -158,7 +158,7 @@ def _walk(
 
 
 def _way(rng: np.random.Generator, lines_m: Floats, blocks: int) -> Floats:
-    """(k, 2): places 1 m apart from crossing to crossing."""
+    """Draw (k, 2) places 1 m apart from crossing to crossing."""
     here = rng.integers(0, CROSSINGS, 2)
     before = here
     places_m = [np.array([[lines_m[0, here[0]], lines_m[1, here[1]]]])]
@@ -177,7 +177,7 @@ def _way(rng: np.random.Generator, lines_m: Floats, blocks: int) -> Floats:
 
 
 def _learned(name: str, walk: Walk) -> RememberedMap:
-    """The map that a walk stored."""
+    """Return the map that a walk stored."""
     rows = np.zeros((len(walk.looks), 7))
     rows[:, :2] = walk.at_m
     labels = [node.label for node in walk.objects(len(walk.way_m))]

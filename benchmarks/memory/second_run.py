@@ -119,7 +119,7 @@ class DriveObserver(TownObserver):
 
     @property
     def is_over(self) -> bool:
-        """Whether the drive has ended."""
+        """Return whether the drive has ended."""
         return self._now_ns >= self._ends_ns
 
     def drive(self) -> Drive:
@@ -155,7 +155,7 @@ def visit(chosen: Visit) -> Drive:
 
 
 def sections(chosen: Visit) -> Sections:
-    """A robot that explores a town and remembers, in lockstep, with percept-level sensing."""
+    """Configure a robot that explores and remembers, in lockstep, with percept-level sensing."""
     configured = town_sections(chosen.seed)
     sim = configured["sim"]
     sim["start"] = chosen.start
@@ -197,7 +197,7 @@ def measure(processes: int) -> Metrics:
 
 
 def named(records: Sequence[StoredRecord], seed: int) -> list[StoredRecord]:
-    """Records of one town, under a name that no other town's have."""
+    """Give the records of one town a name that no other town's have."""
     return [msgspec.structs.replace(record, map=f"town-{seed}") for record in records]
 
 
@@ -210,7 +210,7 @@ def share_of_way(first: Drive, second: Drive) -> float:
 
 
 def is_right(first: Drive, second: Drive) -> bool:
-    """Whether the first run's map was recalled, and the agent is where it takes itself to be."""
+    """Decide whether the first run's map was recalled, and the agent is where it believes it is."""
     if not second.recalled:
         return False
 

@@ -43,7 +43,7 @@ class NumpyLoop:
 
 
 def reads_vs_numpy_loop(seed: int) -> float:
-    """Single reads a second of a memory with the default settings, over those of the loop.
+    """Return single reads a second of a memory with the default settings, over those of the loop.
 
     Both are the least CPU time of several reads.
     """

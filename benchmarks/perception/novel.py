@@ -98,7 +98,7 @@ def remembered(
 
 
 def _sightings(meeting: Meeting) -> list[tuple[int, str, float]]:
-    """The buildings that a segment matches, what it is called, and its activation."""
+    """Return each building that a segment matches, what it is called, and its activation."""
     found = []
 
     for segment in meeting.sight.segments:

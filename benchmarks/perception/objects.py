@@ -95,7 +95,7 @@ def claims(percepts: Sequence[Percept], shape: tuple[int, ...]) -> list[Claim]:
 
 
 def filled(percept: Percept, shape: tuple[int, ...]) -> Booleans:
-    """The pixels that the percept's outline holds, (h, w)."""
+    """Mark the pixels that the percept's outline holds, (h, w)."""
     mask = np.zeros(shape, np.uint8)
     outline_px = np.array(percept.outline_px, np.int32)
     if len(outline_px) >= 3:
@@ -105,8 +105,8 @@ def filled(percept: Percept, shape: tuple[int, ...]) -> Booleans:
 
 
 def overlaps(found: Sequence[Booleans], label: Bytes, numbers: Sequence[int]) -> Floats:
-    """Intersection over union of each mask with the pixels of each number in `label`, (masks,
-    numbers).
+    """Compute intersection over union of each mask with the pixels of each number in `label`,
+    (masks, numbers).
     """
     shape = (len(found), len(numbers))
     iou = np.zeros(shape)
@@ -122,8 +122,8 @@ def overlaps(found: Sequence[Booleans], label: Bytes, numbers: Sequence[int]) ->
 
 
 def match(iou: Floats) -> list[int | None]:
-    """For each row the column that it matches at MATCH_IOU or better, the best pairs first, none
-    twice.
+    """Find for each row the column that it matches at MATCH_IOU or better, the best pairs first,
+    none twice.
     """
     matched: list[int | None] = [None] * len(iou)
     left = iou.copy()
@@ -142,8 +142,8 @@ def match(iou: Floats) -> list[int | None]:
 def named(
     sights: Iterable[Sight], trained: frozenset[str], min_m: float, max_m: float
 ) -> list[bool]:
-    """Of each segment that matches a building of a trained kind at that distance, whether its
-    label is right.
+    """Decide for each segment that matches a building of a trained kind at that distance whether
+    its label is right.
     """
     right = []
 
@@ -158,7 +158,7 @@ def named(
 
 
 def detection(sights: Iterable[Sight], min_share: float = LARGE_SHARE) -> tuple[int, int, int, int]:
-    """Of large buildings how many were found, and how many there are; of large segments how many
+    """Count how many large buildings were found, and how many there are; how many large segments
     match, and all.
     """
     found = 0
@@ -185,12 +185,12 @@ def detection(sights: Iterable[Sight], min_share: float = LARGE_SHARE) -> tuple[
 def right_or_not(
     candidates: Iterable[Sight], percepts: Iterable[Sight], trained: frozenset[str]
 ) -> list[tuple[float, bool]]:
-    """Activation of each candidate, and whether its label is right, over the views of one pipeline
-    in order.
+    """Return the activation of each candidate, and whether its label is right, over the views of
+    one pipeline in order.
 
-    That of a trained class is right where the building is of that kind, that of a node that was
-    learned where the building is the one whose percept it was first given to, and no label where
-    there is no building, or one that has none yet.
+    The label of a trained class is right if the building is of that kind. The label of a node that
+    was learned is right if the building is the one whose percept it was first given to. No label is
+    right if there is no building, or one that has none yet.
     """
     owner: dict[str, int | None] = {}
     judged: list[tuple[float, bool]] = []
@@ -218,8 +218,8 @@ def right_or_not(
 
 
 def calibration_error(judged: Sequence[tuple[float, bool]]) -> float:
-    """Expected calibration error (Naeini, Cooper and Hauskrecht 2015): BINS bins of equal width,
-    NaN of nothing.
+    """Compute the expected calibration error (Naeini, Cooper and Hauskrecht 2015): BINS bins of
+    equal width, NaN of nothing.
     """
     if not judged:
         return float("nan")

@@ -101,7 +101,7 @@ def _train(
     epochs: int | None = None,
     images: int | None = None,
 ) -> None:
-    """Raises UsageError if torch is not installed."""
+    """Train on photographs. Raises UsageError if torch is not installed."""
     try:
         from cogmap.training.camvid import train_on
     except ImportError as error:
@@ -123,7 +123,7 @@ def mean_mask(known: Sequence[Photograph]) -> Booleans:
 
 
 def _mask_iou(mask: Booleans, shown: Iterable[Photograph]) -> float:
-    """The IoU of road if each image shows it in `mask`."""
+    """Compute the IoU of road if each image shows it in `mask`."""
 
     def scaled(image: Bytes) -> Booleans:
         height, width, _ = image.shape
@@ -134,6 +134,6 @@ def _mask_iou(mask: Booleans, shown: Iterable[Photograph]) -> float:
 
 
 def _small(mask: Booleans) -> Singles:
-    """The share of each of PRIOR_SIZE_PX pixels for which the mask is true."""
+    """Return the share of each of PRIOR_SIZE_PX pixels for which the mask is true."""
     shares = cv2.resize(mask.astype(np.float32), PRIOR_SIZE_PX, interpolation=cv2.INTER_AREA)
     return shares.astype(np.float32, copy=False)

@@ -31,10 +31,10 @@ def road_iou(found: Booleans, surface: Bytes) -> float:
 def road_edge_errors_m(
     boundary_m: npt.ArrayLike, surface: Bytes, depth_m: Singles, camera: Calibration
 ) -> Floats:
-    """The distance of each point of `boundary_m` (n, 2), in the robot's frame, from the nearest
-    true one of the view.
+    """Return the distance of each point of `boundary_m` (n, 2), in the robot's frame, from the
+    nearest true one of the view.
 
-    `surface` and true `depth_m` are (h, w). Infinite where no road ends in the view.
+    `surface` and true `depth_m` are (h, w). Infinite if no road ends in the view.
     """
     points_m = _points_m(boundary_m)
     true_m = true_boundary_m(surface, depth_m, camera, WITHIN_M + BEYOND_M)
@@ -44,14 +44,14 @@ def road_edge_errors_m(
 def road_edges_missed_m(
     boundary_m: npt.ArrayLike, surface: Bytes, depth_m: Singles, camera: Calibration
 ) -> Floats:
-    """The distance of each true point where road ends, within WITHIN_M, from the nearest found."""
+    """Return how far each true point where road ends within WITHIN_M is from the nearest found."""
     points_m = _points_m(boundary_m)
     true_m = true_boundary_m(surface, depth_m, camera, WITHIN_M)
     return _nearest_m(true_m, points_m)
 
 
 def road_edge_error_m(errors_m: list[Floats]) -> float:
-    """The median over all points of all views. NaN if there is no point."""
+    """Return the median over all points of all views. NaN if there is no point."""
     every_m = np.concatenate([*errors_m, np.empty(0)])
     if not every_m.size:
         return float("nan")
@@ -84,8 +84,8 @@ def true_boundary_m(
 
 
 def _between_m(one: Bytes, other: Bytes, one_m: Floats, other_m: Floats) -> Floats:
-    """Points (n, 2) half way between neighbouring pixels of which one is road and the other is
-    other ground.
+    """Return points (n, 2) half way between neighbouring pixels of which one is road and the other
+    is other ground.
 
     `one` and `other` are their surfaces (h, w), `one_m` and `other_m` the ground that they show.
     """
@@ -102,7 +102,7 @@ def _points_m(boundary_m: npt.ArrayLike) -> Floats:
 
 
 def _nearest_m(points_m: Floats, others_m: Floats) -> Floats:
-    """The distance from each of (n, 2) points to the nearest of (m, 2) others."""
+    """Return the distance from each of (n, 2) points to the nearest of (m, 2) others."""
     if not len(others_m):
         return np.full(len(points_m), np.inf)
 

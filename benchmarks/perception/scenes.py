@@ -60,10 +60,10 @@ class Scene:
 def drawn(
     seed: int, invented: int, poses: Poses, buildings: int | None = None
 ) -> Iterator[tuple[town.Town, Calibration, Iterator[Scene]]]:
-    """The town of `seed` with up to `invented` kinds that nobody was taught, or only so many
+    """Draw the town of `seed` with up to `invented` kinds that nobody was taught, or only so many
     `buildings` of it.
 
-    Its scenes are each drawn when asked for, in a light of its own.
+    Each of its scenes is drawn when it is asked for, in a light of its own.
     """
     whole = town.generate(seed, towns.kinds(seed, invented))
     place = replace(whole, plots=whole.plots[:buildings])
@@ -91,8 +91,8 @@ def drawn(
 
 
 def anywhere(count: int) -> Poses:
-    """`count` poses: half towards each building in turn, from any side and range, half on streets,
-    looking anywhere.
+    """Draw `count` poses: half towards each building in turn, from any side and range, half on
+    streets, looking anywhere.
     """
 
     def poses(place: town.Town, rng: np.random.Generator) -> list[Pose]:
@@ -116,7 +116,7 @@ def anywhere(count: int) -> Poses:
 
 
 def drive(metres: float, step_m: float) -> Poses:
-    """A path along the town's loop from its start, corners turned on the spot."""
+    """Follow the town's loop from its start, corners turned on the spot."""
 
     def poses(place: town.Town, rng: np.random.Generator) -> list[Pose]:
         corners_m = np.asarray(place.line(1.0))
@@ -141,7 +141,7 @@ def _turned(pose: Pose, turn_rad: float) -> Pose:
 
 
 def _towards(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
-    """About towards a building, from anywhere that is free."""
+    """Draw a pose that looks about towards a building, from anywhere that is free."""
     while True:
         range_m = float(rng.uniform(NEAREST_M, FARTHEST_M))
         side_rad = float(rng.uniform(-math.pi, math.pi))
@@ -153,8 +153,8 @@ def _towards(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
 
 
 def facing(place: town.Town, target: int, range_m: float, side_rad: float) -> Pose:
-    """The pose that looks at the middle of plot `target` from `range_m` away in the direction
-    `side_rad` of it.
+    """Return the pose that looks at the middle of plot `target` from `range_m` away in the
+    direction `side_rad` of it.
     """
     plot = place.plots[target]
     back_rad = side_rad + math.pi
@@ -166,7 +166,7 @@ def facing(place: town.Town, target: int, range_m: float, side_rad: float) -> Po
 
 
 def side_and_range(place: town.Town, pose: Pose) -> Floats:
-    """In which direction of each plot's middle the robot is, and how far away, (plots, 2)."""
+    """Return in which direction of each plot's middle the robot is, and how far, (plots, 2)."""
     middles_m = np.array([(plot.x_m, plot.y_m) for plot in place.plots])
     robot_m = np.array([pose.x_m, pose.y_m])
     x_m, y_m = (robot_m - middles_m).T
@@ -177,7 +177,7 @@ def side_and_range(place: town.Town, pose: Pose) -> Floats:
 
 
 def skyline(place: town.Town, pose: Pose) -> npt.NDArray[np.intp]:
-    """The nearest plot in each of RAYS directions across the view, from left to right, -1 where
+    """Find the nearest plot in each of RAYS directions across the view, from left to right, -1 if
     there is none.
     """
     bearings_rad = np.linspace(HALF_VIEW_RAD, -HALF_VIEW_RAD, RAYS)
@@ -198,8 +198,8 @@ def skyline(place: town.Town, pose: Pose) -> npt.NDArray[np.intp]:
 
 
 def encounter(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
-    """From a fair distance, on any side, with as little of other buildings in the view as a few
-    tries find.
+    """Draw a pose at a fair distance from a building, on any side. Of a few tries it is the one
+    with the least of other buildings in the view.
     """
     best = None
     min_cost = 2 * RAYS
@@ -223,8 +223,8 @@ def encounter(place: town.Town, target: int, rng: np.random.Generator) -> Pose:
 
 
 def later(place: town.Town, target: int, first: Pose, rng: np.random.Generator) -> Pose | None:
-    """Looking at plot `target` from another side and distance than `first` did, about towards it,
-    None if hidden.
+    """Draw a pose that looks at plot `target` from another side and distance than `first` did,
+    about towards it; return None if it is hidden.
     """
     side_rad, first_m = side_and_range(place, first)[target].tolist()
 
@@ -247,5 +247,5 @@ def later(place: town.Town, target: int, first: Pose, rng: np.random.Generator) 
 
 
 def other_distance(range_m: float, first_m: float) -> bool:
-    """Whether `range_m` is another distance than `first_m`: a third more, or less by as much."""
+    """Decide whether `range_m` differs from `first_m`: a third more, or less by as much."""
     return max(range_m, first_m) >= MIN_RATIO * min(range_m, first_m)

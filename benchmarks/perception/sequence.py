@@ -68,7 +68,7 @@ class Answer:
 
 
 def measure() -> Metrics:
-    """The metrics of place recognition, of all TOWNS driven one after the other."""
+    """Measure place recognition in all TOWNS, driven one after the other."""
     recognizer = PlaceRecognizer()
     answers = list[Answer]()
 
@@ -104,7 +104,7 @@ def drive(recognizer: PlaceRecognizer, first_frame: int, place: town.Town) -> It
 
 
 def course(place: town.Town) -> list[Stretch]:
-    """A lap, a side street, and the lap again in another light."""
+    """Plan a lap, a side street, and the lap again in another light."""
     rng = np.random.default_rng([place.seed, 0x5E])
     light = some_light(rng)
     other_light = some_light(rng)
@@ -128,7 +128,7 @@ def poses(
     offset_m: float = 0.0,
     turn_rad: float = 0.0,
 ) -> list[Pose]:
-    """Poses along `line`, its corners rounded, at steps between `steps_m`.
+    """Draw poses along `line`, its corners rounded, at steps between `steps_m`.
 
     Each is beside the line by up to `offset_m`, and turned from its direction by up to `turn_rad`:
     these and the length of a step change slowly along the line.
@@ -175,7 +175,7 @@ def poses(
 
 
 def _slowly(rng: np.random.Generator, at_m: Floats, every_m: float, limit: float) -> Floats:
-    """Values up to `limit` to both sides, between ones drawn at every so many metres."""
+    """Interpolate values up to `limit` to both sides, between ones drawn every so many metres."""
     beyond_m = at_m[-1] + 2 * every_m
     knots_m = np.arange(0.0, beyond_m, every_m)
     values = rng.uniform(-limit, limit, len(knots_m))
@@ -183,7 +183,7 @@ def _slowly(rng: np.random.Generator, at_m: Floats, every_m: float, limit: float
 
 
 def metrics(answers: Sequence[Answer]) -> Metrics:
-    """Recall at 99 % precision, and that of the answers as they were given."""
+    """Return the recall at 99 % precision, and that of the answers as they were given."""
     score = np.array([answer.match.score if answer.match else 0.0 for answer in answers])
     right = np.array(
         [
@@ -214,8 +214,8 @@ def _ratio(some: Booleans, of_all: Booleans) -> float:
 
 
 def recall(score: Floats, right: Booleans, wanted: Booleans, precision: float) -> float:
-    """The share of `wanted` views that are matched rightly, at the lowest score that gives at least
-    `precision`.
+    """Return the share of `wanted` views that are matched rightly, at the lowest score that gives
+    at least `precision`.
 
     0 if no score does; a view of score 0 is not matched.
     """
@@ -229,7 +229,7 @@ def recall(score: Floats, right: Booleans, wanted: Booleans, precision: float) -
 
 
 def same(one: Answer, other: Answer) -> bool:
-    """Whether both were at the same place and looked in about the same direction."""
+    """Decide whether both were at the same place and looked in about the same direction."""
     if one.seed != other.seed:
         return False
 

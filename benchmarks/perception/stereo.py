@@ -24,11 +24,11 @@ Image = npt.NDArray[Any]
 
 
 def measure(left: Path, right: Path, disparity: Path, scale: float) -> Metrics:
-    """The shares of pixels whose disparity errs by more than OFF_PX, ours and plain StereoSGBM's.
+    """Measure the shares of pixels whose disparity errs by more than OFF_PX, ours and StereoSGBM's.
 
-    Of all pixels whose truth is known; a pixel without a match counts as wrong, for both.
-    `*_together_*` is of the pixels only that both match. Raises UsageError if a file is missing,
-    no image, or of another size.
+    They are shares of all pixels whose truth is known; a pixel without a match counts as wrong, for
+    both. `*_together_*` is of the pixels only that both match. Raises UsageError if a file is
+    missing, no image, or of another size.
     """
     left_rgb = _read_rgb(left)
     right_rgb = _read_rgb(right)
@@ -39,7 +39,7 @@ def measure(left: Path, right: Path, disparity: Path, scale: float) -> Metrics:
 
 
 def compared(left: Bytes, right: Bytes, true_px: Singles) -> Metrics:
-    """The metrics of `measure`, of a pair's images (h, w, 3) and true disparities (h, w)."""
+    """Compute the metrics of `measure`, of images (h, w, 3) and true disparities (h, w)."""
     most_px = float(true_px.max())
     matcher = StereoMatcher(most_px)
     ours = matcher.disparity_px(left, right)
@@ -80,8 +80,8 @@ def _off(name: str, found_px: Singles, true_px: Singles) -> Metrics:
 
 
 def off_share(found_px: Singles, true_px: Singles, most_px: float) -> float:
-    """Of the pixels with a true disparity, over 0, the share that errs by more than `most_px`, or
-    is not found, 0. NaN if no pixel has one.
+    """Return the share of the pixels with a true disparity, over 0, that errs by more than
+    `most_px`, or is not found, 0. NaN if no pixel has one.
     """
     is_known = true_px > 0
     if not is_known.any():
@@ -93,13 +93,13 @@ def off_share(found_px: Singles, true_px: Singles, most_px: float) -> float:
 
 
 def unmatched(found_px: Singles, true_px: Singles) -> float:
-    """Of the pixels with a true disparity the share for which none was found."""
+    """Return the share of the pixels with a true disparity for which none was found."""
     return off_share(found_px, true_px, math.inf)
 
 
 def plain_sgbm(left: Bytes, right: Bytes, most_px: float) -> Singles:
-    """StereoSGBM as OpenCV's documentation sets it up, on grey images: disparities, float32 (h, w),
-    0 unmatched.
+    """Match grey images by StereoSGBM as OpenCV's documentation sets it up. Returns disparities,
+    float32 (h, w), 0 unmatched.
     """
     area = PLAIN_BLOCK_PX**2
     matcher = cv2.StereoSGBM.create(

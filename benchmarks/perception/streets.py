@@ -19,7 +19,7 @@ Piece = tuple[Point, Point]
 
 
 def edges(areas: Sequence[Rectangle]) -> Floats:
-    """The outline of the union of `areas`: pieces (n, 2, 2) from point to point.
+    """Find the outline of the union of `areas`: pieces (n, 2, 2) from point to point.
 
     None runs inside another area.
     """
@@ -49,7 +49,7 @@ def edges(areas: Sequence[Rectangle]) -> Floats:
 
 
 def distances_m(points_m: npt.ArrayLike, pieces: Floats) -> Floats:
-    """From each of `points_m` (n, 2) to the nearest point of any of `pieces` (m, 2, 2)."""
+    """Measure from each of `points_m` (n, 2) to the nearest point of any of `pieces` (m, 2, 2)."""
     points = np.asarray(points_m, np.float64)
     nearest = nearest_on_pieces(pieces[:, 0], pieces[:, 1], points)
     offset_m = points - nearest.foot_m
@@ -57,7 +57,7 @@ def distances_m(points_m: npt.ArrayLike, pieces: Floats) -> Floats:
 
 
 def in_town(points_m: npt.ArrayLike, pose: Pose) -> Floats:
-    """Points (n, 2) in the robot's frame, x forward and y left, in the town's."""
+    """Transform points (n, 2) in the robot's frame, x forward and y left, to the town's."""
     robot = np.array([pose.x_m, pose.y_m, pose.heading_rad])
     points = np.asarray(points_m, np.float64)
     return transform_from(robot, points.reshape(-1, 2))

@@ -191,7 +191,7 @@ def measure_novel(seed: int, sightings: int) -> Memory:
 
 
 def _first_and_again(sightings: int) -> Poses:
-    """One pose that meets each of NOVEL buildings, and then up to `sightings` others of each."""
+    """Draw one pose that meets each of NOVEL buildings, then up to `sightings` others of each."""
 
     def poses(place: Town, rng: np.random.Generator) -> list[Pose]:
         first = [encounter(place, target, rng) for target in range(NOVEL)]

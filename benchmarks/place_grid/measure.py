@@ -85,7 +85,7 @@ def measure(setting: Setting) -> Metrics:
 
 
 def _proposal(number: int, base_version: int, rng: np.random.Generator) -> Proposal:
-    """New values of every column of every cell of a tile."""
+    """Make a proposal of new values of every column of every cell of a tile."""
     inside = np.argwhere(np.ones((TILE_SIDE, TILE_SIDE), bool))
     cells = inside + np.array(TILE) * TILE_SIDE
 

@@ -51,7 +51,7 @@ class _Job(NamedTuple):
 
 
 def measure_tsp(folder: Path, processes: int) -> Metrics:
-    """The mean excess over the problems of MIN_CITIES to MAX_CITIES cities in a folder, and each.
+    """Measure the mean excess over the problems of MIN_CITIES to MAX_CITIES cities, and each.
 
     A problem's own is the mean over tours that begin at each of its cities. The optimum is that of
     NAME.opt.tour, or else computed exactly. `tsp_left_out` files are of a type that is not read.
@@ -88,7 +88,7 @@ def measure_tsp(folder: Path, processes: int) -> Metrics:
 
 
 def measure_human(folder: Path, processes: int) -> Metrics:
-    """How far the model's participants agree with the people of a folder of tours."""
+    """Measure how far the model's participants agree with the people of a folder of tours."""
     problems = read_folder(folder)
     jobs = human_jobs(problems, PARTICIPANTS, SEED)
     with bar("planning people's problems") as progress:

@@ -32,7 +32,7 @@ MOSAIC: Any = [["grid", "border", "place"], ["raster", "raster", "agreement"]]
 
 
 def figure(scenes: list[Scene], seeds: Sequence[int]) -> Figure:
-    """The sheet: the first scene with two walls in detail, and all of `scenes` (their `seeds`)
+    """Draw the sheet: the first scene with two walls in detail, and all of `scenes` (their `seeds`)
     against Bayes' rule.
     """
     chosen = next(number for number, scene in enumerate(scenes) if len(scene.cues.borders) == 2)
@@ -100,7 +100,7 @@ def _counts(spikes: Spikes) -> Values:
 
 
 def _show(axes: Axes, counts: Values, title: str) -> None:
-    """Spikes by place, the room from above."""
+    """Show spikes by place, the room from above."""
     number = round(SIDE_M / PLACE_M)
     room = counts.reshape(number, number)
     axes.imshow(
@@ -115,7 +115,7 @@ def _show(axes: Axes, counts: Values, title: str) -> None:
 
 
 def _draw_ellipse(axes: Axes, of: Posterior, colour: str, style: LineStyle, label: str) -> None:
-    """The ellipse of two standard deviations."""
+    """Draw the ellipse of two standard deviations."""
     values, vectors = np.linalg.eigh(of.covariance_m2)
     height, width = 4 * np.sqrt(values)
     along_x, along_y = vectors[:, 1]
@@ -141,7 +141,7 @@ def _add_legend(axes: Axes) -> None:
 
 
 def _draw_agreement(axes: Axes, scenes: list[Scene]) -> None:
-    """Standard deviations of the spikes over those of the exact posterior, along x and y."""
+    """Draw standard deviations of the spikes over those of the exact posterior, along x and y."""
     exact = np.array([scene.exact.sd_m for scene in scenes]).ravel()
     spiking = np.array([scene.spiking.sd_m for scene in scenes]).ravel()
     least = min(exact.min(), spiking.min())

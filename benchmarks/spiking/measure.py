@@ -138,7 +138,7 @@ def measure(setting: Setting, *, seed: int = SEED, folder: Path | None = None) -
 
 
 def metrics(scenes: list[Scene]) -> Metrics:
-    """Ratios of standard deviations, along x and y; errors of means in exact SDs."""
+    """Compute ratios of standard deviations, along x and y; errors of means in exact SDs."""
     spiking = [(scene.exact, scene.spiking) for scene in scenes]
     rejection = [(scene.exact, scene.rejection) for scene in scenes]
     spikes = [scene.spikes for scene in scenes]
@@ -153,7 +153,7 @@ def metrics(scenes: list[Scene]) -> Metrics:
 
 
 def _compared(name: str, pairs: list[tuple[Posterior, Posterior]]) -> Metrics:
-    """Of pairs of the exact posterior and another."""
+    """Compare pairs of the exact posterior and another."""
     ratios: Values = np.array([other.sd_m / exact.sd_m for exact, other in pairs])
     errors = np.array([exact.off(other.mean_m) for exact, other in pairs])
 

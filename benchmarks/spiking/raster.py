@@ -33,7 +33,7 @@ class Train:
 
     @property
     def cycles(self) -> Spikes:
-        """1 in each cycle with a spike, 0 in others."""
+        """Return 1 in each cycle with a spike, 0 in others."""
         return np.unpackbits(self.spikes)
 
     def times_s(self, first_cycle: int) -> Values:
@@ -45,7 +45,7 @@ class Train:
 
 
 def draw_raster(axes: Axes, spikes: Recording) -> None:
-    """The inputs of the place cell that fires most, and its own spikes when all coincide."""
+    """Draw the inputs of the place cell that fires most, and its own spikes when all coincide."""
     most = int(np.argmax(spikes.counts))
     place = Train("place cell", spikes.place[most], ESTIMATE)
 

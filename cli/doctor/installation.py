@@ -20,7 +20,7 @@ EXTRAS = ("", "rendering")  # what a drive in a simulated town needs
 
 
 def examine(runs: Path) -> list[Finding]:
-    """All findings about this installation, where runs are kept in `runs`."""
+    """Collect all findings about this installation, whose runs are kept in `runs`."""
     return [
         *python_version(sys.version_info[:2]),
         *rendering(sys.version_info[:2], sys.platform, platform.machine()),
@@ -31,7 +31,7 @@ def examine(runs: Path) -> list[Finding]:
 
 
 def python_version(version: tuple[int, int]) -> Iterator[Finding]:
-    """Whether `version` (major, minor) is new enough."""
+    """Yield a finding if `version` (major, minor) is too old."""
     if version < OLDEST_PYTHON:
         running = ".".join(map(str, version))
         oldest = ".".join(map(str, OLDEST_PYTHON))
@@ -52,7 +52,7 @@ def rendering(version: tuple[int, int], system: str, machine: str) -> Iterator[F
 
 
 def declared() -> list[str]:
-    """The requirements that the installed package declares."""
+    """Return the requirements that the installed package declares."""
     try:
         return metadata.requires(PACKAGE) or []
     except metadata.PackageNotFoundError:
@@ -60,8 +60,8 @@ def declared() -> list[str]:
 
 
 def required(lines: Iterable[str]) -> list[Requirement]:
-    """The requirements that hold here, those of rendering included; not those of another extra, or
-    for another Python or platform.
+    """Return the requirements that hold here, those of rendering included, but not those of another
+    extra, or for another Python or platform.
     """
     requirements = []
     for line in lines:
@@ -91,7 +91,7 @@ def dependencies(requirements: Iterable[Requirement]) -> Iterator[Finding]:
 
 
 def renderer() -> Iterator[Finding]:
-    """Whether EGL renders the camera images; without pybullet nothing does."""
+    """Yield a finding if EGL does not render the camera images; without pybullet nothing does."""
     if find_spec("pybullet") is None:
         return
 
@@ -106,7 +106,7 @@ def renderer() -> Iterator[Finding]:
 
 
 def write_access(runs: Path) -> Iterator[Finding]:
-    """Whether files can be written into `runs`, a folder that need not exist yet."""
+    """Yield a finding if no file can be written into `runs`, a folder that need not exist yet."""
     folder = runs.absolute()
     while not folder.exists():
         folder = folder.parent

@@ -40,7 +40,7 @@ class Observed:
 
 
 def examine(expected: Iterable[str], observed: Observed, system: System) -> list[Finding]:
-    """All findings about a system that should have the modules `expected`."""
+    """Collect all findings about a system that should have the modules `expected`."""
     return [
         *absent(expected, observed),
         *silent(expected, observed),
@@ -52,7 +52,7 @@ def examine(expected: Iterable[str], observed: Observed, system: System) -> list
 
 
 def absent(expected: Iterable[str], observed: Observed) -> Iterator[Finding]:
-    """Modules of which no instance is on the bus."""
+    """Yield a finding for each module of which no instance is on the bus."""
     present = {member.module for member in observed.ready}
     for name in expected:
         if name not in present:
@@ -64,7 +64,7 @@ def absent(expected: Iterable[str], observed: Observed) -> Iterator[Finding]:
 
 
 def silent(expected: Iterable[str], observed: Observed) -> Iterator[Finding]:
-    """Instances of the modules that are on the bus and report nothing."""
+    """Yield a finding for each instance of the modules that is on the bus but reports nothing."""
     modules = set(expected)
     for member in sorted(observed.ready):
         if member.module in modules and member.instance not in observed.health:
@@ -76,14 +76,14 @@ def silent(expected: Iterable[str], observed: Observed) -> Iterator[Finding]:
 
 
 def not_ready(observed: Observed) -> Iterator[Finding]:
-    """Instances that report that they are not ready."""
+    """Yield a finding for each instance that reports that it is not ready."""
     for instance, reports in sorted(observed.health.items()):
         if not reports[-1].ready:
             yield Finding(instance, "it is not ready", "start the modules that it waits for")
 
 
 def complaints(observed: Observed) -> Iterator[Finding]:
-    """Losses, rejected messages, growing queues and notes that the instances report."""
+    """Yield the losses, rejected messages, growing queues and notes that the instances report."""
     for instance, reports in sorted(observed.health.items()):
         last = reports[-1]
         for name, number in sorted(last.gaps.items()):
@@ -115,7 +115,7 @@ def complaints(observed: Observed) -> Iterator[Finding]:
 
 
 def wrong_rates(observed: Observed, system: System) -> Iterator[Finding]:
-    """Topics whose rate is not the table's, as far as a few seconds of real time can show."""
+    """Yield topics whose rate is not the table's, as far as a few seconds of real time can show."""
     clock_rate = 1.0 if observed.clock_rate is None else observed.clock_rate
     if clock_rate == 0:
         return
@@ -136,7 +136,7 @@ def wrong_rates(observed: Observed, system: System) -> Iterator[Finding]:
 
 
 def rates_hz(reports_of: Iterable[list[Health]]) -> dict[str, float]:
-    """The rate of each published topic, between each instance's first and last report."""
+    """Compute the rate of each published topic, between each instance's first and last report."""
     rates: dict[str, float] = {}
     for reports in reports_of:
         first = reports[0]
@@ -152,7 +152,7 @@ def rates_hz(reports_of: Iterable[list[Health]]) -> dict[str, float]:
 
 
 def truth_leaks(expected: Iterable[str], system: System) -> Iterator[Finding]:
-    """Modules that subscribe to the simulator's ground truth."""
+    """Yield a finding for each module that subscribes to the simulator's ground truth."""
     modules = set(expected)
     for topic in topics.ALL:
         if topic.scope is not Scope.TRUTH:

@@ -90,8 +90,7 @@ def city_maps(
     noise: tuple[float, float, float],
     fit: bool,
 ) -> None:
-    """Experiment 2, figure 8: the maps that an agent learns of cities, with their loops closed and
-    not.
+    """Run experiment 2, figure 8: an agent learns maps of cities, with their loops closed and not.
 
     Each map has eight buildings in at most 4 km². An agent that knows nothing drives the shortest
     tour past them along the streets, from any of the buildings. Percepts are not rendered: they

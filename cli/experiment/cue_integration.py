@@ -50,7 +50,7 @@ Examples:
 )
 @common_options
 def cue_integration(common: Common, trials: int, distance_noise: float, fit: bool) -> None:
-    """Experiment 1, figure 7: an agent carries a post back to its place in the dark, guided by
+    """Run experiment 1, figure 7: an agent carries a post back to its place in the dark, guided by
     self-motion, landmarks, or both.
 
     It is in Nardini's room. There are four conditions: self-motion alone, landmarks alone after
@@ -87,9 +87,9 @@ def cue_integration(common: Common, trials: int, distance_noise: float, fit: boo
 
 
 def _differing(trial: Trial) -> list[str]:
-    """The topics on which `trial` publishes other bytes through real processes.
+    """Return the topics on which `trial` publishes other bytes through real processes.
 
-    The response is named too where it is another.
+    The response is named too if it is another.
     """
     inside = Session(trial)
     outside = Session(trial)

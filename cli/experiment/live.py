@@ -30,7 +30,7 @@ SAME = "live_same"
 
 
 def differing(sections: Sections, modules: Sequence[str]) -> list[str]:
-    """The topics on which `modules` publish other bytes as processes than on the in-memory bus.
+    """Find topics on which `modules` publish other bytes as processes than on the in-memory bus.
 
     The simulation is one of them and moves its robot itself, so nothing else has to be there.
     """
@@ -50,7 +50,7 @@ def differing(sections: Sections, modules: Sequence[str]) -> list[str]:
 
 
 def check(differing: Sequence[str] | None) -> None:
-    """Raise CogmapError where topics differ: the command then ends with code 1."""
+    """Raise CogmapError if topics differ: the command then ends with code 1."""
     if differing:
         raise CogmapError(
             f"through real processes the run published other bytes on {', '.join(differing)}"

@@ -26,7 +26,7 @@ Examples:
 @click.command(name=NAME, epilog=_EPILOG)
 @common_options
 def loop_closing(common: Common) -> None:
-    """Figure 6: a path around some blocks, before and after its loop is closed by reverse replay.
+    """Make figure 6: a path around some blocks, before and after reverse replay closes its loop.
 
     The agent drives twice: positions are corrected, by the paper's rule, or headings too. Percepts
     are not rendered: they have the measured errors of perception. --cameras drives once more with

@@ -38,7 +38,7 @@ Examples:
 )
 @common_options_without_sensing
 def map_structure(common: Common, osm: Path | None, all_in: Path | None) -> None:
-    """Sub-maps of real cities, found by the model that structures the agent's map.
+    """Find sub-maps of real cities, by the model that structures the agent's map.
 
     Objects are buildings, and places that people use; their functions come from tags. Railways,
     water, walls and main roads are boundaries. The true sub-maps are not known. So the metrics are

@@ -84,9 +84,7 @@ def common_options(command: Command) -> Command:
 
 
 def common_options_without_sensing(command: Command) -> Command:
-    """As `common_options`, for an experiment in which nothing is sensed: without --cameras and
-    --live.
-    """
+    """Give `command` the shared options but --cameras and --live, as nothing is sensed."""
     return _with(command, _OPTIONS)
 
 

@@ -26,7 +26,7 @@ KINDS = ("png", "pdf")
 
 
 def folder_for(name: str, out: Path | None) -> Path:
-    """`out`, or runs/`name`, made where it is not there. Raises UsageError where it cannot be."""
+    """Make `out`, or the folder runs/`name`, if it is missing. Raises UsageError if that fails."""
     folder = out if out is not None else Path("runs") / name
 
     try:
@@ -40,7 +40,7 @@ def folder_for(name: str, out: Path | None) -> Path:
 
 
 def command_line() -> str:
-    """The command that this process was called with, to be run again."""
+    """Return the command that this process was called with, to be run again."""
     return shlex.join(["cogmap", *sys.argv[1:]])
 
 

@@ -64,8 +64,8 @@ Examples:
 def route_planning(
     common: Common, data: Path | None, participants: int, drawn: int, max_goals: int
 ) -> None:
-    """Experiment 3, figure 5: the order of several goals, planned on a hierarchy of maps and on a
-    flat one.
+    """Run experiment 3, figure 5: the order of several goals, planned on a hierarchy of maps and on
+    a flat one.
 
     Tours of people, of the model and on the flat map are compared with the shortest tour, which is
     computed exactly. The model's participants judge lengths with an error of 3 %, begin at

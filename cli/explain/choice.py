@@ -40,7 +40,7 @@ class Covered:
 
 
 def require_decisions(log: Log) -> None:
-    """Raise LogError where `log` has no broadcast, or no action: it decides nothing."""
+    """Raise LogError if `log` has no broadcast, or no action: it decides nothing."""
     missing = {topic.name for topic in NEEDED}
     for entry in log.messages(*missing):
         missing.discard(entry.topic)
@@ -55,7 +55,7 @@ def require_decisions(log: Log) -> None:
 
 
 def last_broadcast(log: Log) -> Cycle:
-    """The cycle of the last broadcast. Raises LogError where there is none."""
+    """Find the cycle of the last broadcast. Raises LogError if there is none."""
     entry = log.last(topics.BROADCAST.name, lambda _message: True)
     if entry is None:
         raise LogError(f"{log.path} holds no {topics.BROADCAST.name}")
@@ -66,7 +66,7 @@ def last_broadcast(log: Log) -> Cycle:
 
 
 def at_time(log: Log, at_s: float) -> Cycle:
-    """The last cycle whose view is at or before `at_s` of the drive. Raises UsageError."""
+    """Find the last cycle whose view is at or before `at_s` of the drive. Raises UsageError."""
     at_ns = round(at_s * 1e9)
     covered = _covered(log)
     if not covered.first.stamp_ns <= at_ns <= covered.last.stamp_ns:
@@ -90,7 +90,7 @@ def at_time(log: Log, at_s: float) -> Cycle:
 
 
 def numbered(log: Log, number: int) -> Cycle:
-    """The cycle with that number. Raises UsageError that names those that there are."""
+    """Find the cycle with that number. Raises UsageError, which names those that there are."""
     found = _of_number(log, number)
     if found is None:
         covered = _covered(log)
@@ -111,7 +111,7 @@ def _of_number(log: Log, number: int) -> Cycle | None:
 
 
 def _covered(log: Log) -> Covered:
-    """What a log covers. Raises LogError where it holds no cycle."""
+    """Find the first and the last cycle of a log. Raises LogError if it holds none."""
     first = next(_cycles(log, *CYCLES), None)
     if first is None:
         names = " and no ".join(topic.name for topic in CYCLES)
@@ -130,7 +130,7 @@ def _covered(log: Log) -> Covered:
 
 
 def _cycles(log: Log, *wanted: Topic, start_s: float = 0.0) -> Iterator[Cycle]:
-    """The cycle of each message, but for answers that came late: their stamp is of another one."""
+    """Yield the cycle of each message but late answers, whose stamp is that of another cycle."""
     for entry in log.messages(*[topic.name for topic in wanted], start_s=start_s):
         message = entry.message
         assert isinstance(message, Delta | Competition)

@@ -14,11 +14,11 @@ _IN_FULL = ("percepts", "competition", "broadcast", "earlier_broadcast", "action
 
 
 def facts(moment: Moment) -> dict[str, Any]:
-    """Every field of what was perceived, competed, broadcast, selected and commanded; None for what
-    the log lacks.
+    """Collect every field of what was perceived, competed, broadcast, selected and commanded; None
+    for what the log lacks.
 
-    Each message has beside it `after_ms`, how long after the view it was sent. Of deltas there are
-    the numbers of operations, of arrays the shapes. `entered` has the cycle of each coalition.
+    Each message has beside it `after_ms`, how long after the view it was sent. Deltas are given by
+    their numbers of operations, arrays by their shapes. `entered` has the cycle of each coalition.
     """
     entered = {name: each.cycle for name, each in moment.entered.items()}
     found: dict[str, Any] = {

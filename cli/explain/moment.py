@@ -42,12 +42,12 @@ class Moment:
 
     @property
     def at_s(self) -> float:
-        """When the view was taken, in seconds of simulated time."""
+        """Return when the view was taken, in seconds of simulated time."""
         return self.stamp_ns / 1e9
 
     @property
     def winner(self) -> str:
-        """The id of the coalition that was broadcast in this cycle; empty where none was."""
+        """Return the id of the coalition that was broadcast in this cycle; empty if none was."""
         if self.competition is not None:
             for contender in self.competition.message.contenders:
                 if contender.fate is Fate.WON:
@@ -58,9 +58,9 @@ class Moment:
 
 
 def moment(log: Log, cycle: int, stamp_ns: int) -> Moment:
-    """All that `log` holds of cycle `cycle`, whose view is of `stamp_ns`.
+    """Read all that `log` holds of cycle `cycle`, whose view is of `stamp_ns`.
 
-    Raises LogError where the log is damaged, ConfigError where its settings are none.
+    Raises LogError if the log is damaged, ConfigError if its settings are not valid.
     """
     reading = Reading(log, cycle, stamp_ns)
     competition = reading.of_cycle(Competition)

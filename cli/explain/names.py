@@ -31,12 +31,12 @@ AHEAD_RAD = math.radians(0.5)
 
 
 def spoken(name: str) -> str:
-    """A label, a kind or the name of a scheme as people write it."""
+    """Write a label, a kind or the name of a scheme as people do."""
     return name.replace("_", " ").replace("~", " ")
 
 
 def of_node(node: GraphNode) -> str:
-    """A node: the agent's pose, an object's label, a goal's name, what a plan comes to."""
+    """Describe a node: the agent's pose, an object's label, a goal's name, where a plan leads."""
     match node:
         case Self():
             degrees = round(math.degrees(math.remainder(node.heading_rad, math.tau)))
@@ -59,13 +59,13 @@ def of_node(node: GraphNode) -> str:
 
 
 def content(coalition: Coalition) -> str:
-    """What a coalition is about: its nodes, in their order."""
+    """Say what a coalition is about: its nodes, in their order."""
     words = [of_node(node) for node in coalition.nodes]
     return ", ".join(words) or "nothing"
 
 
 def brief(coalition: Coalition) -> str:
-    """What a coalition is about, in a few words: its first nodes."""
+    """Say in a few words what a coalition is about: its first nodes."""
     words = []
     for node in coalition.nodes[:NAMED]:
         match node:
@@ -83,7 +83,7 @@ def brief(coalition: Coalition) -> str:
 
 
 def of_percept(percept: Percept) -> str:
-    """Where an object is seen, as far as that is known."""
+    """Say where an object is seen, as far as that is known."""
     parts = []
     if percept.has_range:
         parts.append(f"{percept.range_m:.1f} m")
@@ -93,12 +93,12 @@ def of_percept(percept: Percept) -> str:
 
 
 def of_feelings(percept: Percept) -> str:
-    """What is felt about an object, and how strongly."""
+    """Say what is felt about an object, and how strongly."""
     return ", ".join(f"{name} {share:.2f}" for name, share in percept.feelings.items())
 
 
 def bearing(bearing_rad: float) -> str:
-    """A direction as seen from the agent, whose left is positive."""
+    """Describe a direction as seen from the agent, whose left is positive."""
     if abs(bearing_rad) < AHEAD_RAD:
         return "ahead"
     side = "left" if bearing_rad > 0 else "right"
@@ -106,7 +106,7 @@ def bearing(bearing_rad: float) -> str:
 
 
 def of_command(command: MotorCommand) -> str:
-    """How a command moves the robot, and what limits it."""
+    """Say how a command moves the robot, and what limits it."""
     moved = motion(command.left_wheel_rad_s, command.right_wheel_rad_s)
     limits = []
     if command.halted_by is not SpeedLimit.NONE:
@@ -117,7 +117,7 @@ def of_command(command: MotorCommand) -> str:
 
 
 def codelets(delta: Delta) -> str:
-    """The codelets whose answers a delta commits, each with the number of its answers."""
+    """List the codelets whose answers a delta commits, each with the number of its answers."""
     named = []
     for task in delta.tasks:  # its id is the cycle, the codelet, and perhaps its subject
         codelet = task.partition("/")[2].partition("/")[0]
@@ -126,7 +126,7 @@ def codelets(delta: Delta) -> str:
 
 
 def counted(names: Iterable[str]) -> str:
-    """Names, each once, with how often it occurs where that is more than once."""
+    """List names, each once, with how often it occurs if that is more than once."""
     words = []
     for name, number in Counter(names).items():
         times = f" ({number})" if number > 1 else ""
@@ -135,7 +135,7 @@ def counted(names: Iterable[str]) -> str:
 
 
 def of_goal(goal: Goal) -> str:
-    """A goal: its object, or its name and position."""
+    """Describe a goal by its object, or by its name and position."""
     if goal.object:
         return f"the goal {spoken(goal.object)}"
 
@@ -147,7 +147,7 @@ def of_goal(goal: Goal) -> str:
 
 
 def of_plan(plan: Plan) -> str:
-    """What a plan comes to."""
+    """Describe a plan: where it leads and how far, or why there is none."""
     if plan.state is not PlanState.READY:
         return f"the plan: {plan.state.value}"
 
@@ -174,12 +174,12 @@ def _map(identifier: str) -> str:
 
 
 def _position(x_m: float, y_m: float) -> str:
-    """With one decimal, and never as minus zero."""
+    """Write a position with one decimal, and never as minus zero."""
     return f"({round(x_m, 1) + 0.0:.1f}, {round(y_m, 1) + 0.0:.1f}) m"
 
 
 def motion(left_rad_s: float, right_rad_s: float) -> str:
-    """How the robot moves with these speeds of its wheels."""
+    """Say how the robot moves with these speeds of its wheels."""
     fastest = max(abs(left_rad_s), abs(right_rad_s))
     if fastest == 0.0:
         return "stand still"

@@ -50,23 +50,23 @@ class Reading:
         self._born_ns = self._sensed_ns()
 
     def of_view(self, kind: type[M]) -> Logged[M] | None:
-        """The first message with the stamp of the cycle's view."""
+        """Find the first message with the stamp of the cycle's view."""
         entry = self._first_of_view(topics.BY_TYPE[kind])
         return None if entry is None else self._logged(kind, entry)
 
     def of_cycle(self, kind: type[OfCycle]) -> Logged[OfCycle] | None:
-        """The message of the cycle."""
+        """Find the message of the cycle."""
         found = self._last(kind, lambda message: message.cycle <= self._cycle)
         if found is None or found.message.cycle != self._cycle:
             return None
         return found
 
     def before_cycle(self, kind: type[OfCycle]) -> Logged[OfCycle] | None:
-        """The last message of the cycles before."""
+        """Find the last message of the cycles before."""
         return self._last(kind, lambda message: message.cycle < self._cycle)
 
     def deltas(self) -> list[Logged[Delta]]:
-        """What the cycle committed, in order."""
+        """List what the cycle committed, in order."""
         before = self.before_cycle(Delta)
         start_s = 0.0 if before is None else before.time_s
 
@@ -80,7 +80,7 @@ class Reading:
         return found
 
     def entered(self, competition: Logged[Competition] | None) -> dict[str, Entered]:
-        """The coalitions of a competition, by id, as far as the log holds their first cycle."""
+        """Find the coalitions of a competition, by id, if the log holds their first cycle."""
         if competition is None:
             return {}
 
@@ -93,7 +93,7 @@ class Reading:
             back *= CYCLES_BACK
 
     def command(self, action: Logged[Action] | None) -> Logged[MotorCommand] | None:
-        """The first command after `action`; where that is None, the answer to the view."""
+        """Find the first command after `action`; if that is None, the answer to the view."""
         if action is None:
             return self.of_view(MotorCommand)
 
@@ -107,7 +107,7 @@ class Reading:
         return None
 
     def _entered_since(self, first: int) -> dict[str, Entered]:
-        """Every coalition that entered after cycle `first`, up to this cycle."""
+        """Collect every coalition that entered after cycle `first`, up to this cycle."""
         name = topics.COALITIONS.name
         before = self._log.last(name, lambda message: message.cycle <= first)
         start_s = 0.0 if before is None else before.time_s
@@ -123,7 +123,7 @@ class Reading:
         return found
 
     def _sensed_ns(self) -> int | None:
-        """When the cycle's view was sensed, by the wall clock; None where the log does not say."""
+        """Find when the view was sensed, by the wall clock; None if the log does not say."""
         for topic in (topics.PERCEPTS, topics.COMPETITION):
             entry = self._first_of_view(topic)
             if entry is not None and entry.envelope is not None:
@@ -154,5 +154,5 @@ class Reading:
 
 
 def name_of(coalition: Coalition, cycle: int) -> str:
-    """The id by which the global workspace calls a coalition that entered in `cycle`."""
+    """Return the id by which the global workspace calls a coalition that entered in `cycle`."""
     return coalition.id or f"{coalition.codelet}/{cycle}"

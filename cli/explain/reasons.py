@@ -19,7 +19,7 @@ OUT_OF_IT = frozenset({Fate.DISPLACED, Fate.DECAYED})
 
 
 def of_competition(moment: Moment) -> list[str]:
-    """Why the competition ended as it did."""
+    """Explain why the competition ended as it did."""
     if moment.competition is None and moment.broadcast is not None:
         trigger = moment.broadcast.message.trigger
         return [f"The broadcast was triggered by: {trigger}; the log does not hold who competed."]
@@ -37,7 +37,7 @@ def of_competition(moment: Moment) -> list[str]:
 
 
 def of_action(moment: Moment) -> list[str]:
-    """Why the action was chosen; if none was, which one continues."""
+    """Explain why the action was chosen; if none was, which one continues."""
     if moment.action is not None:
         return why_chosen(moment.action.message)
 
@@ -54,7 +54,7 @@ def of_action(moment: Moment) -> list[str]:
 
 
 def won(competition: Competition) -> Contender | None:
-    """The contender that was broadcast, if one was."""
+    """Return the contender that was broadcast, if one was."""
     for contender in competition.contenders:
         if contender.fate is Fate.WON:
             return contender
@@ -62,14 +62,14 @@ def won(competition: Competition) -> Contender | None:
 
 
 def ranked_contenders(competition: Competition) -> list[Contender]:
-    """The winner first, then the others by activation."""
+    """Sort the contenders: the winner first, then the others by activation."""
     return sorted(
         competition.contenders, key=lambda each: (each.fate is not Fate.WON, -each.activation)
     )
 
 
 def ranked_behaviours(action: Action) -> list[Behaviour]:
-    """The chosen one first, then the others by activation."""
+    """Sort the behaviours: the chosen one first, then the others by activation."""
     return sorted(
         action.behaviours,
         key=lambda each: (each.rejection is not Rejection.NONE, -each.activation),
@@ -77,13 +77,13 @@ def ranked_behaviours(action: Action) -> list[Behaviour]:
 
 
 def next_best(action: Action) -> Behaviour | None:
-    """The most active behaviour that was not chosen, if there is one."""
+    """Find the most active behaviour that was not chosen, if there is one."""
     others = [each for each in action.behaviours if each.rejection is not Rejection.NONE]
     return max(others, key=lambda each: each.activation, default=None)
 
 
 def chosen(behaviour: Behaviour) -> str:
-    """What became of a behaviour."""
+    """Say what became of a behaviour."""
     if behaviour.rejection is Rejection.NONE:
         return "chosen"
     return f"rejected: {behaviour.rejection.value}"
@@ -106,7 +106,7 @@ def why_most_active(competition: Competition, winner: Contender) -> str:
 
 
 def why_now(moment: Moment, competition: Competition) -> str:
-    """What triggered the broadcast, with the figures where the trigger is one known here."""
+    """Say what triggered the broadcast, with the figures if the trigger is one known here."""
     settings = moment.settings
     activations = [each.activation for each in _competing(competition)]
     strongest = max(activations)
@@ -124,7 +124,7 @@ def why_now(moment: Moment, competition: Competition) -> str:
 
 
 def why_none(moment: Moment, competition: Competition) -> str:
-    """Why a competition triggered no broadcast, by the settings of the global workspace."""
+    """Explain why a competition triggered no broadcast, by the global workspace's settings."""
     if competition.trigger:
         return f"A broadcast was triggered by: {competition.trigger.value}; the log has no winner."
 
@@ -167,18 +167,18 @@ def why_chosen(action: Action) -> list[str]:
 
 
 def _beginning(name: str) -> str:
-    """A name at the beginning of a sentence."""
+    """Write a name for the beginning of a sentence."""
     words = spoken(name)
     return words[:1].upper() + words[1:]
 
 
 def _competing(competition: Competition) -> list[Contender]:
-    """The contenders that were there when the broadcast was triggered."""
+    """Return the contenders that were there when the broadcast was triggered."""
     return [each for each in competition.contenders if each.fate not in OUT_OF_IT]
 
 
 def _silent_s(moment: Moment) -> float | None:
-    """How long before this cycle the last broadcast was; None where there was none."""
+    """Return how long before this cycle the last broadcast was; None if there was none."""
     if moment.earlier_broadcast is None:
         return None
     return (moment.stamp_ns - moment.earlier_broadcast.message.stamp_ns) / 1e9

@@ -41,7 +41,7 @@ def print_moment(moment: Moment) -> None:
 
 
 def _inside(stage: Stage) -> Group:
-    """The rows of a stage, and below them why."""
+    """Lay out the rows of a stage, and below them why it came out so."""
     parts: list[RenderableType] = []
     for _, rows in groupby(stage.rows, key=lambda row: len(row.cells)):
         parts.append(_columns(list(rows)))
@@ -50,7 +50,7 @@ def _inside(stage: Stage) -> Group:
 
 
 def _columns(rows: list[Row]) -> Table:
-    """Rows of as many cells, of which the last may take several lines."""
+    """Lay out rows that have equally many cells; the last cell may take several lines."""
     table = Table.grid(padding=(0, 2))
     last = len(rows[0].cells) - 1
     for number in range(last + 1):

@@ -34,12 +34,12 @@ class Stage:
 
 
 def headline(moment: Moment) -> str:
-    """Which moment it is."""
+    """Say which moment it is."""
     return f"cycle {moment.cycle}, {moment.at_s:.3f} s into the drive"
 
 
 def stages(moment: Moment) -> list[Stage]:
-    """The stages of the cycle, in order."""
+    """Describe the stages of the cycle, in order."""
     return [
         perceived(moment),
         workspace(moment),
@@ -51,12 +51,12 @@ def stages(moment: Moment) -> list[Stage]:
 
 
 def delay(after_ms: float | None) -> str:
-    """How long after the view; empty where that is not known."""
+    """Say how long after the view it was; empty if that is not known."""
     return "" if after_ms is None else f"+{after_ms:.0f} ms"
 
 
 def bar(share: float) -> str:
-    """A bar of BAR_CELLS characters, full for 1."""
+    """Draw a bar of BAR_CELLS characters, full for 1."""
     eighths = round(min(1.0, max(0.0, share)) * BAR_CELLS * 8)
     whole, rest = divmod(eighths, 8)
     last = EIGHTHS[rest] if rest else ""
@@ -64,7 +64,7 @@ def bar(share: float) -> str:
 
 
 def recognised(percepts: Percepts) -> str:
-    """What there is in percepts, in a few words."""
+    """Say in a few words what there is in percepts."""
     number = len(percepts.objects)
     plural = "" if number == 1 else "s"
     words = [f"{number or 'no'} object{plural}"]
@@ -76,7 +76,7 @@ def recognised(percepts: Percepts) -> str:
 
 
 def committed(delta: Delta) -> str:
-    """What a delta commits: whose answers, or how many operations."""
+    """Say what a delta commits: whose answers, if any, and how many operations."""
     number = len(delta.operations)
     operations = f"{number} operation{'' if number == 1 else 's'}"
     who = names.codelets(delta)
@@ -84,7 +84,7 @@ def committed(delta: Delta) -> str:
 
 
 def since(moment: Moment, name: str) -> str:
-    """In which cycle the coalition with that id entered; empty where the log does not say."""
+    """Say in which cycle the coalition with that id entered; empty if the log does not say."""
     entered = moment.entered.get(name)
     if entered is None:
         return ""
@@ -94,7 +94,7 @@ def since(moment: Moment, name: str) -> str:
 
 
 def phases(moment: Moment) -> list[tuple[float | None, str, str]]:
-    """What the workspace did, in order: when, in which phase, whose answers it committed."""
+    """List what the workspace did, in order: when, in which phase, whose answers it committed."""
     shown = [each for each in moment.deltas if each.message.operations or each.message.tasks]
     rows = [(each.after_ms, each.message.phase.value, committed(each.message)) for each in shown]
 
@@ -110,7 +110,7 @@ def phases(moment: Moment) -> list[tuple[float | None, str, str]]:
 
 
 def conscious_before(moment: Moment) -> str:
-    """What was broadcast last before this cycle, and when."""
+    """Say what was broadcast last before this cycle, and when."""
     earlier = moment.earlier_broadcast
     if earlier is None:
         return "nothing was conscious before"
@@ -123,7 +123,7 @@ def conscious_before(moment: Moment) -> str:
 
 
 def perceived(moment: Moment) -> Stage:
-    """The objects that were recognised in the view."""
+    """Describe the objects that were recognised in the view."""
     if moment.percepts is None:
         return Stage("perceived", None, [Row((NOT_IN_LOG,))])
 
@@ -138,7 +138,7 @@ def perceived(moment: Moment) -> Stage:
 
 
 def workspace(moment: Moment) -> Stage:
-    """The answers that the workspace committed, and those that it rejected."""
+    """Describe the answers that the workspace committed, and those that it rejected."""
     rows = [Row((delay(after_ms), phase, what)) for after_ms, phase, what in phases(moment)]
     after_ms = moment.deltas[-1].after_ms if moment.deltas else None
     why = []
@@ -150,7 +150,7 @@ def workspace(moment: Moment) -> Stage:
 
 
 def competition(moment: Moment) -> Stage:
-    """The coalitions that competed for consciousness."""
+    """Describe the coalitions that competed for consciousness."""
     why = reasons.of_competition(moment)
     if moment.competition is None:
         return Stage("competition", None, why=why)
@@ -171,7 +171,7 @@ def competition(moment: Moment) -> Stage:
 
 
 def conscious(moment: Moment) -> Stage:
-    """The content that became conscious."""
+    """Describe the content that became conscious."""
     if moment.broadcast is None:
         return Stage("conscious", None, [Row((f"nothing new; {conscious_before(moment)}",))])
 
@@ -186,7 +186,7 @@ def conscious(moment: Moment) -> Stage:
 
 
 def action(moment: Moment) -> Stage:
-    """The action that was selected, and the other behaviours."""
+    """Describe the action that was selected, and the other behaviours."""
     why = reasons.of_action(moment)
     if moment.action is None:
         return Stage("action", None, why=why)
@@ -200,7 +200,7 @@ def action(moment: Moment) -> Stage:
 
 
 def command(moment: Moment) -> Stage:
-    """The command that moved the wheels."""
+    """Describe the command that moved the wheels."""
     if moment.command is None:
         return Stage("command", None, [Row(("none that followed is in the log",))])
 

@@ -15,19 +15,19 @@ _COGMAP = (sys.executable, "-P", "-m", "cogmap.cli.main")
 
 
 def cogmap_command(*arguments: str) -> list[str]:
-    """The command line of `cogmap` itself, with the Python and the sources of this process."""
+    """Return the command line of `cogmap` itself, with this process's Python and sources."""
     return [*_COGMAP, *arguments]
 
 
 def arguments_of(command: Sequence[str]) -> list[str] | None:
-    """The arguments of a command line that `cogmap_command` made; None of any other."""
+    """Return the arguments of a command line that `cogmap_command` made; None of any other."""
     if tuple(command[: len(_COGMAP)]) != _COGMAP:
         return None
     return list(command[len(_COGMAP) :])
 
 
 def environment() -> dict[str, str]:
-    """This process's, with ONE_THREAD."""
+    """Return this process's environment, with ONE_THREAD."""
     inherited = os.environ | ONE_THREAD
 
     paths = [str(_SOURCES)]

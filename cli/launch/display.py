@@ -30,7 +30,7 @@ class Display(Protocol):
 
 
 def _drive_line(observer: Observer, errors: Errors) -> str:
-    """Time and distance so far, and the errors at the last estimate; 0 before the first."""
+    """Write time and distance so far, and the errors at the last estimate; 0 before the first."""
     estimate_m, fused_m, wheels_m = (
         float(errors_m[-1]) if errors_m.size else 0.0
         for errors_m in (errors.estimate_m, errors.fused_m, errors.wheels_m)
@@ -98,9 +98,9 @@ class PlainDisplay:
             self.show(line)
 
     def close(self) -> None:
-        """Nothing to leave."""
+        """Leave the lines as they are."""
 
 
 def display_on(console: Console) -> Display:
-    """The display that suits `console`."""
+    """Make the display that suits `console`."""
     return LiveDisplay(console) if console.is_terminal else PlainDisplay(console)

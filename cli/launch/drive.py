@@ -65,15 +65,15 @@ class Drive:
 
     @property
     def participants(self) -> Mapping[str, int]:
-        """How many instances of each module take part."""
+        """Return how many instances of each module take part."""
         participants: dict[str, int] = self.sections["run"]["participants"]
         return participants
 
     def run(self, until_s: float, stop: Stop, display: Display) -> tuple[Watch, Ending]:
         """Drive until every goal is reached, the time of the drive is over, it cannot succeed,
-        `until_s` on the monotonic clock, or `stop`; every process is ended.
+        `until_s` on the monotonic clock has come, or `stop` was asked; then end every process.
 
-        Raises ProcessFailedError, with its last words, where a process failed before the drive had
+        Raises ProcessFailedError, with its last words, if a process failed before the drive had
         begun.
         """
         config = to_toml(self.sections)
@@ -161,7 +161,7 @@ class Drive:
     def _ending(
         self, watch: Watch, missing: list[str], until_s: float, stop: Stop
     ) -> Ending | None:
-        """How the drive must end now; None while it continues."""
+        """Decide how the drive must end now; None while it continues."""
         tally = watch.tally
         observer = tally.observer
         if stop.asked:
@@ -189,7 +189,7 @@ class Drive:
         return self._watchdog.check(situation)
 
     def _ending_of_simulation(self, observer: Observer) -> Ending:
-        """How a drive has ended whose simulation has: at its goals, or as its time is over."""
+        """Say how a drive ended whose simulation has: at its goals, or as its time is over."""
         sim = self.sections["sim"]
         if not sim["ends_at_goal"] and self.guide is None:
             return Ending(Outcome.ROUTE_COMPLETE, "the time of the drive is over")
@@ -203,7 +203,7 @@ class Drive:
 
     @property
     def goals(self) -> str:
-        """The goals that the agent has from its start, the first of them by name."""
+        """Return the goals that the agent has from its start, the first of them by name."""
         names = [goal["name"] for goal in self.sections["workspace"]["goals"]]
         named = ", ".join(names[:MAX_NAMES])
         more = len(names) - MAX_NAMES
@@ -224,7 +224,7 @@ class Drive:
 
 
 def _out_of_time(tally: Tally, missing: list[str]) -> Ending:
-    """How a drive ends at its time limit: the reason is what it waits for, or the robot's speed."""
+    """Say how a drive ends at its time limit: because of what it waits for, or its speed."""
     if missing:
         names = ", ".join(missing)
         waited = f"the time limit came while it waited for {names}: see its log"
@@ -239,7 +239,7 @@ def _out_of_time(tally: Tally, missing: list[str]) -> Ending:
 
 
 def _reached(observer: Observer) -> str:
-    """How far a drive is, in words."""
+    """Say how far a drive is."""
     if observer.goals:
         return f"{observer.goals_reached} of {observer.goals} goals"
     return f"{observer.progress:.0%} of its time"

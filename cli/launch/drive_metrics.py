@@ -31,7 +31,7 @@ class ErrorMetrics(msgspec.Struct, kw_only=True):
 
     @classmethod
     def of(cls, errors_m: Floats) -> ErrorMetrics:
-        """The metrics of (n,) distances; all 0 where there is none: nothing was measured."""
+        """Compute the metrics of (n,) distances; all 0 if there is none: nothing was measured."""
         if not errors_m.size:
             return cls(mean_m=0.0, max_m=0.0, final_m=0.0)
         return cls(
@@ -42,7 +42,7 @@ class ErrorMetrics(msgspec.Struct, kw_only=True):
 
     @property
     def is_measured(self) -> bool:
-        """Whether there was anything to compare: no path is exact."""
+        """Return whether there was anything to compare: a path that was compared is never exact."""
         return self.max_m > 0.0
 
 
@@ -58,7 +58,7 @@ class Recording(msgspec.Struct, kw_only=True):
 
     @classmethod
     def read(cls, path: Path) -> Recording | None:
-        """From the log at `path`; None where it was not finished, or cannot be read."""
+        """Read it from the log at `path`; None if that was not finished, or cannot be read."""
         try:
             about = LogReader(path).about(SUMMARY)
             summary = msgspec.json.decode(about.get("json", ""), type=Summary)
@@ -160,17 +160,17 @@ class RunMetrics(RecordedMetrics, kw_only=True):
 
 
 def objects(graph: Graph) -> list[Object]:
-    """The objects of the map, by id."""
+    """Return the objects of the map, by id."""
     return list(graph.of_kind(Object))
 
 
 def position_m(node: Object) -> tuple[float, float]:
-    """The position of an object in the agent's frame."""
+    """Return the position of an object in the agent's frame."""
     return node.x_m, node.y_m
 
 
 def object_errors_m(observer: Observer, graph: Graph) -> Floats:
-    """How far each learned object is from the building of its name, (n,); one whose name no
+    """Measure how far each learned object is from the building of its name, (n,); one whose name no
     building has does not count.
     """
     built = observer.town.buildings if observer.town else []
@@ -190,7 +190,7 @@ def object_errors_m(observer: Observer, graph: Graph) -> Floats:
 
 
 def road_m2(graph: Graph) -> float:
-    """The area of the place nodes that are taken for road."""
+    """Compute the area of the place nodes that are taken for road."""
     _, road = graph.places.written_cells(ROOT_MAP, PlaceColumn.ROAD)
     is_road = road > ROAD_THRESHOLD
     area_m2 = graph.cell_m() ** 2
@@ -198,13 +198,13 @@ def road_m2(graph: Graph) -> float:
 
 
 def _length_m(steps_m: Floats) -> float:
-    """The length of (n, 2, 2) steps."""
+    """Compute the length of (n, 2, 2) steps."""
     return float(np.hypot(*(steps_m[:, 1] - steps_m[:, 0]).T).sum())
 
 
 def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) -> DriveMetrics:
-    """The metrics of a drive, with the messages that were lost and rejected, by topic. A mean and a
-    percentile of nothing are 0.
+    """Compute the metrics of a drive, with the messages that were lost and rejected, by topic. A
+    mean and a percentile of nothing are 0.
     """
     observer = tally.observer
     graph = tally.replica.graph

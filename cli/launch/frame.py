@@ -35,5 +35,5 @@ class MapFrame:
                         self._start = self._offered
 
     def from_start(self, points_m: Floats) -> Floats:
-        """Points (n, 2) of the map in the frame in which the agent began."""
+        """Transform points (n, 2) of the map into the frame in which the agent began."""
         return se2.transform_to(self._start, points_m)

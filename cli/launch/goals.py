@@ -38,17 +38,17 @@ class GoalProgress:
 
     @property
     def count(self) -> int:
-        """How many goals the agent has."""
+        """Return how many goals the agent has."""
         return len(self._is_reached)
 
     @property
     def reached(self) -> int:
-        """How many of its goals the agent has reached."""
+        """Return how many of its goals the agent has reached."""
         return sum(self._is_reached.values())
 
     def share(self, travelled_m: float) -> float:
-        """The share of its goals that the agent has reached, the next one as far as its way there
-        is behind it by the plan; below 1 while there is a goal to reach, 0 where there is none.
+        """Compute the share of its goals that the agent has reached, the next one by the part of
+        the planned way that is behind it; below 1 while one is left to reach, 0 if it has none.
         """
         if not self.count:
             return 0.0
@@ -64,12 +64,12 @@ class GoalProgress:
 
 
 def name_of(goal: str) -> str:
-    """What a goal is called, by its id."""
+    """Return the name of the goal with this id."""
     return goal.removeprefix(goal_id(""))
 
 
 def unreached(graph: Graph) -> dict[str, str]:
-    """Why each goal that the agent has was not reached, by its name: why it has no route, or what
+    """Explain why each goal of the agent was not reached, by its name: why it has no route, or what
     was still to be done.
     """
     plan = graph.get(Plan, PLAN_ID)
@@ -82,14 +82,14 @@ def unreached(graph: Graph) -> dict[str, str]:
 
 
 def routeless(goal: str, state: PlanState, graph: Graph) -> str:
-    """Why a goal has no route, and what may have been meant by one that is not on the map."""
+    """Say why a goal has no route, and what may have been meant by one that is not on the map."""
     meant = nearest_label(goal, state, graph)
     return f"{state.value}: did you mean {meant!r}?" if meant else state.value
 
 
 def nearest_label(goal: str, state: PlanState, graph: Graph) -> str:
-    """The label on the map that is most like that of a goal of this id that is not on it; empty
-    where none is like it, or the goal has no route for another reason.
+    """Find the label on the map that is most like that of the goal with this id, which is not on
+    it; empty if none is like it, or if the goal has no route for another reason.
     """
     if state is not PlanState.UNKNOWN_GOAL:
         return ""

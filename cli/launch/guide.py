@@ -52,7 +52,7 @@ class Guide:
 
     @property
     def sentence(self) -> str:
-        """What the agent does now."""
+        """Return a sentence on what the agent does now."""
         names = ", ".join(name.removeprefix(goal_id("")) for name in self._goals)
         match self.stage:
             case Stage.EXPLORES:
@@ -65,7 +65,7 @@ class Guide:
                 return f"the agent was at every goal: {names}"
 
     def step(self, observer: Observer, graph: Graph) -> list[Message]:
-        """Offer the goals, close the street, see whether all is done; what is to be published."""
+        """Offer the goals, close the street, see whether all is done. Returns what to publish."""
         if observer.start is None:
             return []
 
@@ -122,7 +122,7 @@ class Guide:
 
 
 def _far_apart(graph: Graph) -> list[Goal]:
-    """TOUR_GOALS objects of the map as goals: each the farthest from those before and the agent."""
+    """Choose TOUR_GOALS objects as goals: each the farthest from those before and the agent."""
     agent = graph.agent
     known = [node for node in graph.of_kind(Object) if node.sightings >= KNOWN_SIGHTINGS]
     if agent is None or len(known) < TOUR_GOALS:
@@ -142,8 +142,8 @@ def _far_apart(graph: Graph) -> list[Goal]:
 
 
 def street_ahead(town: TrueTown, route_m: Floats) -> Street | None:
-    """The street that a (n, 2) route passes first, of those ahead whose ends stay connected without
-    it; None where there is none.
+    """Find the street that a (n, 2) route passes first, of those ahead whose ends stay connected
+    without it; None if there is none.
     """
     passed = [each for each in streets_ahead(town, route_m) if _is_avoidable(town, each.street)]
     first = min(passed, key=lambda each: each.along_m, default=None)
@@ -158,8 +158,8 @@ class Passed(NamedTuple):
 
 
 def streets_ahead(town: TrueTown, route_m: Floats) -> list[Passed]:
-    """The streets whose middle, where a barrier stands, a (n, 2) route passes, BARRIER_AHEAD_M
-    ahead at least; in the order of the town.
+    """Find the streets whose middle, where a barrier would stand, a (n, 2) route passes, at least
+    BARRIER_AHEAD_M ahead; in the order of the town.
     """
     along_m = distances_along(route_m)
     passed = []
@@ -174,7 +174,7 @@ def streets_ahead(town: TrueTown, route_m: Floats) -> list[Passed]:
 
 
 def _is_avoidable(town: TrueTown, street: Street) -> bool:
-    """Whether the ends of a street are connected by others."""
+    """Decide whether other streets connect the ends of a street."""
     reached = [street.line_m[0]]
     left = [each for each in town.streets if each.name != street.name and not each.closed]
     for here in reached:

@@ -45,12 +45,12 @@ class Errors:
 
     @property
     def over_wheels(self) -> float:
-        """Mean error of the estimate over that of the wheels alone; 1 where there is neither."""
+        """Return the mean error of the estimate over the wheels' alone; 1 if there is neither."""
         return _ratio(self.estimate_m, self.wheels_m)
 
     @property
     def over_fused(self) -> float:
-        """Mean error of the estimate over that of fused self-motion alone; 1 where there is
+        """Return the mean error of the estimate over fused self-motion's alone; 1 if there is
         neither.
         """
         return _ratio(self.estimate_m, self.fused_m)
@@ -89,7 +89,7 @@ class Observer:
     def update(self, message: Message) -> None:
         """Take account of one message; one that does not concern the robot's path is ignored.
 
-        Raises MessageError where it is not what its topic carries.
+        Raises MessageError if it is not what its topic carries.
         """
         match message:
             case TruePose():
@@ -149,23 +149,23 @@ class Observer:
 
     @property
     def recalled(self) -> str:
-        """The name of the map of an earlier run that the agent has recalled, empty where none."""
+        """Return the name of an earlier run's map that the agent has recalled, empty if none."""
         return self._frame.recalled
 
     @property
     def goals(self) -> int:
-        """How many goals the agent has."""
+        """Return how many goals the agent has."""
         return self._goals.count
 
     @property
     def goals_reached(self) -> int:
-        """How many of its goals the agent has reached."""
+        """Return how many of its goals the agent has reached."""
         return self._goals.reached
 
     @property
     def progress(self) -> float:
-        """The share of its goals that the agent has reached, the way to the next one included;
-        where it has none, that of the drive's time.
+        """Return the share of its goals that the agent has reached, the way to the next one
+        included; if it has none, the share of the drive's time that has passed.
         """
         if not self.goals:
             return self._share_of_time
@@ -173,21 +173,21 @@ class Observer:
 
     @property
     def now_s(self) -> float:
-        """The simulated time."""
+        """Return the simulated time."""
         return self._now_ns / 1e9
 
     @property
     def elapsed_s(self) -> float:
-        """Time of the drive so far, by the stamps of its messages."""
+        """Return the time of the drive so far, by the stamps of its messages."""
         elapsed_ns = self._now_ns - self._began_ns
         return max(0, elapsed_ns) / 1e9
 
     def to_world(self, points_m: Floats) -> Floats:
-        """Points (n, 2) of the agent's map in the world's frame."""
+        """Transform points (n, 2) of the agent's map into the world's frame."""
         return self._from_start(self._frame.from_start(points_m))
 
     def _from_start(self, points_m: Floats) -> Floats:
-        """Points (n, 2) of the frame in which the agent began, in the world's."""
+        """Transform points (n, 2) of the frame in which the agent began into the world's."""
         start = self.start
         if start is None:
             return points_m
@@ -197,7 +197,7 @@ class Observer:
 
     @property
     def map_frame(self) -> Pose | None:
-        """The origin of the agent's map in the world's frame; None before the first pose."""
+        """Return the origin of the agent's map in the world's frame; None before the first pose."""
         start = self.start
         if start is None:
             return None
@@ -209,13 +209,13 @@ class Observer:
 
     @property
     def true_path_m(self) -> Floats:
-        """(n, 2), in the world's frame like all paths here."""
+        """Return the (n, 2) true path, in the world's frame like all paths here."""
         return self._true.points_m
 
     @property
     def shortcuts_m(self) -> Floats:
-        """(n, 2, 2): the steps of the true path to goals through streets in which the robot had not
-        been before it had any; none where it had goals before it had left its first street.
+        """Return the (n, 2, 2) steps of the true path to goals through streets that the robot had
+        not been in before it had any; none if it had goals before it had left its first street.
         """
         if not self.goals or self._explored_m < STREET_M:
             return np.zeros((0, 2, 2))
@@ -223,22 +223,22 @@ class Observer:
 
     @property
     def estimated_path_m(self) -> Floats:
-        """(n, 2): the self node's positions."""
+        """Return the (n, 2) positions of the self node."""
         return self._from_start(self._estimate.points_m)
 
     @property
     def wheels_path_m(self) -> Floats:
-        """(n, 2): the wheels' odometry integrated, nothing else."""
+        """Return the (n, 2) path that the wheels' odometry alone adds up to."""
         return self._from_start(self._wheels.track.points_m)
 
     @property
     def fused_path_m(self) -> Floats:
-        """(n, 2): the fused self-motion (`sensory/motion`) integrated, nothing else."""
+        """Return the (n, 2) path that fused self-motion (`sensory/motion`) alone adds up to."""
         return self._from_start(self._fused.track.points_m)
 
     def errors(self) -> Errors:
-        """The errors at the stamp of every estimate that truth, wheels and fused self-motion all
-        cover; none of the wheels where these publish nothing, as at the level of percepts.
+        """Compute the errors at the stamp of every estimate that truth, wheels and fused
+        self-motion cover; none of the wheels if these publish nothing, as at the level of percepts.
         """
         others = [self._true, self._fused.track]
         if len(self._wheels.track):
@@ -258,8 +258,8 @@ class Observer:
         )
 
     def _distances_m(self, track: Track, stamps_ns: Indices) -> Floats:
-        """How far the positions of `track` at (n,) stamps are from the true ones, (n,); (0,) if it
-        has none.
+        """Measure how far the positions of `track` at (n,) stamps are from the true ones, (n,);
+        (0,) if it has none.
         """
         if not len(track):
             return np.zeros(0)

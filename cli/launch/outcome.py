@@ -27,7 +27,7 @@ class Outcome(enum.Enum):
 
     @property
     def exit_code(self) -> int:
-        """What `cogmap run` exits with."""
+        """Return what `cogmap run` exits with."""
         match self:
             case Outcome.ROUTE_COMPLETE:
                 return 0

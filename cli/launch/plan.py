@@ -72,8 +72,8 @@ class Choices:
 
 
 def effective(base: Sections, choices: Choices, observer: bool) -> Sections:
-    """The whole configuration of every module: `base`, the choices, the agent's first goals, and
-    the default of every other key. Raises ConfigError.
+    """Make the whole configuration of every module: `base`, the choices, the agent's first goals,
+    and the default of every other key. Raises ConfigError.
     """
     config.check_sections(base, registry.sections())
     if choices.laps is not None and not _has_laps(base, choices):
@@ -91,7 +91,7 @@ def effective(base: Sections, choices: Choices, observer: bool) -> Sections:
 
 
 def _has_laps(base: Sections, choices: Choices) -> bool:
-    """Whether the agent's goals are the corners of the loop."""
+    """Decide whether the agent's goals are the corners of the loop."""
     sim = base.get("sim", {})
     has_goals = choices.goals or choices.explore_s is not None or choices.tour
     is_given = has_goals or "goals" in base.get("workspace", {}) or "trajectory" in sim
@@ -99,7 +99,7 @@ def _has_laps(base: Sections, choices: Choices) -> bool:
 
 
 def _chosen(base: Sections, choices: Choices, observer: bool) -> Sections:
-    """Every section there may be, as in `base` where it is, with the choices in it."""
+    """Return every section there may be, as in `base` if it is there, with the choices in it."""
     sensing = base.get("sim", {}).get("sensing", "percepts")
     is_stepped = choices.lockstep or (choices.tour and sensing == "percepts")
     sections = {name: dict(base.get(name, {})) for name in registry.sections()}
@@ -162,7 +162,7 @@ def _give_goals(sections: Sections, choices: Choices) -> None:
 
 
 def participants(choices: Choices, observer: bool) -> dict[str, int]:
-    """How many instances of whom take part: every module, the workers, the recorder, and an
+    """Count the instances that take part, by name: every module, the workers, the recorder, and an
     `observer`.
     """
     members = dict.fromkeys(registry.MODULES, 1) | {REPLICATED: choices.codelets}
@@ -174,13 +174,13 @@ def participants(choices: Choices, observer: bool) -> dict[str, int]:
 
 
 def to_toml(sections: Sections) -> str:
-    """`sections` as a TOML file that `config.load` reads back to the same."""
+    """Format `sections` as a TOML file that `config.load` reads back to the same."""
     return tomli_w.dumps(sections)
 
 
 def programs(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[Program]:
-    """All processes of a run but those that somebody else starts, in the order in which they are to
-    be started: early what the others wait for, the simulation too, whose world takes long to build.
+    """List all processes of a run but those that somebody else starts, in the order in which to
+    start them: first what the others wait for, and the simulation, whose world takes long to build.
 
     Modules are held until what records them is there.
     """
@@ -193,7 +193,7 @@ def programs(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[
     options = ["--tied", "--connect", endpoint, "--agent", agent, "--config", config_path]
 
     def record(starts: int) -> list[str]:
-        """A recorder that died leaves its log as it is, and the next one writes another."""
+        """Return a recorder's command. One that died leaves its log; the next writes another."""
         name = LOG_NAME if starts == 0 else f"log-{starts + 1}.mcap"
         return cogmap_command("log", "record", *options, "-o", str(folder / name))
 

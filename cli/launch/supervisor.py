@@ -39,7 +39,7 @@ class Program:
 
     @classmethod
     def of(cls, instance: str, command: Sequence[str], is_held: bool = False) -> Program:
-        """A program that is started by the same command line each time."""
+        """Make a program that is started by the same command line each time."""
         return cls(instance, lambda starts: command, is_held)
 
 
@@ -117,13 +117,13 @@ class Child:
 
     @property
     def pid(self) -> int:
-        """The process id."""
+        """Return the process id."""
         return self._process.pid
 
     def restart_if_dead(self) -> bool:
-        """Start it again some time after it died, later each time. True when that was now.
+        """Start it again some time after it died, later each time. Returns whether that was now.
 
-        Raises ProcessFailedError with its last words where a restart would not help: it ended with
+        Raises ProcessFailedError with its last words if a restart would not help: it ended with
         USAGE_EXIT, or has died MAX_QUICK_DEATHS times within STEADY_S of its start.
         """
         code = self._process.poll()
@@ -139,7 +139,7 @@ class Child:
         return True
 
     def _restart_time_s(self, code: int) -> float:
-        """When to start it again after it ended with `code`, on the monotonic clock."""
+        """Decide when to start it again after it ended with `code`, on the monotonic clock."""
         instance = self.program.instance
         lines = self._log.read_text(errors="replace").splitlines()
         written = [line for line in lines if line.strip()]
@@ -169,7 +169,7 @@ class Child:
             self._process.terminate()
 
     def end(self, deadline_s: float) -> bool:
-        """Wait until it has ended, and kill it at the deadline. True if it ended by itself."""
+        """Wait until it has ended; kill it at the deadline. Returns whether it ended by itself."""
         try:
             self._process.wait(max(0.0, deadline_s - time.monotonic()))
             by_itself = True
@@ -209,7 +209,7 @@ class Supervisor:
             child.release()
 
     def check(self) -> None:
-        """Restart what has died. Raises ProcessFailedError where that would not help."""
+        """Restart what has died. Raises ProcessFailedError if that would not help."""
         for instance, child in self.children.items():
             if child.restart_if_dead():
                 self.restarts[instance] += 1

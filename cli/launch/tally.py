@@ -67,12 +67,12 @@ class EnergyTally:
 
     @property
     def is_charging(self) -> bool:
-        """Whether the robot is being charged."""
+        """Return whether the robot is being charged."""
         return self.newest is not None and self.newest.is_charging
 
     @property
     def is_out(self) -> bool:
-        """Whether the robot has run out of energy."""
+        """Return whether the robot has run out of energy."""
         return self.lowest <= 0.0
 
     def metrics(self) -> EnergyMetrics | None:
@@ -126,9 +126,7 @@ class Tally:
             intake.reject(arrival.topic.name, str(error))
 
     def update(self, message: Message, envelope: Envelope, received_ns: int) -> None:
-        """Take account of one message. Raises MessageError where it is not what its topic
-        carries.
-        """
+        """Take account of one message. Raises MessageError if it is not what its topic carries."""
         self.observer.update(message)
         match message:
             case Delta():
@@ -164,7 +162,7 @@ class Tally:
             self.slowed[command.slowed_by.value] += 1
 
     def share_limited_by(self, limit: SpeedLimit) -> float:
-        """The share of the commands that it slowed or halted; 0 where there is none."""
+        """Compute the share of the commands that `limit` slowed or halted; 0 if there is none."""
         halted = self.halted[limit.value]
         slowed = self.slowed[limit.value]
         commands = max(1, len(self.cycle_ms))
@@ -172,12 +170,12 @@ class Tally:
 
     @property
     def busy(self) -> dict[str, float]:
-        """The mean share of its time that each instance was computing."""
+        """Return the mean share of its time that each instance was computing."""
         return {name: fmean(shares) for name, shares in sorted(self._busy.items())}
 
     def gaps(self, own: Counter[str]) -> dict[str, int]:
-        """Messages lost for good on each NEVER_DROP topic, by the count of whoever lost most: the
-        modules, or this process with its `own` count.
+        """Count messages lost for good on each NEVER_DROP topic, by whoever lost most: a module, or
+        this process with its `own` count.
         """
         reported = [health.gaps for health in self.health.values()]
         counts: list[Mapping[str, int]] = [own, *reported]
@@ -186,7 +184,7 @@ class Tally:
         return {name: max(count.get(name, 0) for count in counts) for name in names}
 
     def rejected(self, own: Counter[str]) -> dict[str, int]:
-        """Messages that were rejected, by topic, summed over the modules and `own`."""
+        """Count messages that were rejected, by topic, summed over the modules and `own`."""
         total = own.copy()
         for health in self.health.values():
             total.update(health.rejected)

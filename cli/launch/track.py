@@ -32,7 +32,7 @@ class Track:
 
     @property
     def last_ns(self) -> int | None:
-        """The stamp of the last position; None where there is none."""
+        """Return the stamp of the last position; None if there is none."""
         return self._stamps_ns[-1] if self._stamps_ns else None
 
     def __len__(self) -> int:
@@ -40,17 +40,17 @@ class Track:
 
     @property
     def stamps_ns(self) -> Indices:
-        """(n,), increasing."""
+        """Return the (n,) stamps, increasing."""
         return np.array(self._stamps_ns, np.int64)
 
     @property
     def points_m(self) -> Floats:
-        """(n, 2)."""
+        """Return the (n, 2) positions."""
         points_m = np.array(self._points_m, np.float64)
         return points_m.reshape(-1, 2)
 
     def covers(self, stamps_ns: Indices) -> Booleans:
-        """Which of the stamps lie between the first and the last position, any shape."""
+        """Mark the stamps, of any shape, that lie between the first and the last position."""
         if not self._stamps_ns:
             return np.zeros(stamps_ns.shape, bool)
 
@@ -61,7 +61,7 @@ class Track:
         return after_first & before_last
 
     def at(self, stamps_ns: Indices) -> Floats:
-        """Positions (k, 2) at (k,) stamps that it covers, interpolated."""
+        """Interpolate positions (k, 2) at (k,) stamps that it covers."""
         first_ns = self._stamps_ns[0]
         known_ns = self.stamps_ns - first_ns
         wanted_ns = stamps_ns - first_ns
@@ -71,8 +71,8 @@ class Track:
         return interpolate(known_s, self.points_m, wanted_s)
 
     def new_since_m(self, stamp_ns: int, away_m: float) -> Floats:
-        """(n, 2, 2): the steps after `stamp_ns` that lead farther than `away_m` past every position
-        until then; none where there is none until then.
+        """Return the (n, 2, 2) steps after `stamp_ns` that lead farther than `away_m` past every
+        position until then; none if there is no position until then.
         """
         points_m = self.points_m
         count = int(np.searchsorted(self.stamps_ns, stamp_ns, side="right"))
@@ -103,8 +103,8 @@ class PathIntegrator:
             self.track.add(stamp_ns, self._x_m, self._y_m)
 
     def reached(self, stamp_ns: int) -> bool:
-        """Whether the path is there already: in lockstep a message is repeated to a module that was
-        restarted.
+        """Decide whether the path has come to this stamp already: in lockstep a message is repeated
+        to a module that was restarted.
         """
         last_ns = self.track.last_ns
         return last_ns is not None and stamp_ns <= last_ns

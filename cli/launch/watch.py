@@ -47,8 +47,8 @@ class Watch:
         self._inbox.call(lambda: change(member))
 
     def pump(self, timeout_s: float) -> bool:
-        """Receive all that has arrived, waiting up to `timeout_s` for the first. False where none
-        of it was of the drive: nothing, or only health.
+        """Receive all that has arrived, waiting up to `timeout_s` for the first. Returns False if
+        none of it was of the drive: nothing, or only health.
         """
         item = self._inbox.take(timeout_s)
         moved = False
@@ -80,16 +80,16 @@ class Watch:
         self._bus.publish(topic, encode(numbered), envelope)
 
     def missing(self, awaited: Mapping[str, int]) -> list[str]:
-        """The modules of which not all instances are ready yet."""
+        """Return the modules of which not all instances are ready yet."""
         ready = Counter(member.module for member in self.present)
         return [name for name, number in awaited.items() if ready[name] < number]
 
     def gaps(self) -> dict[str, int]:
-        """Messages lost for good on each NEVER_DROP topic, by the count of whoever lost most."""
+        """Count messages lost for good on each NEVER_DROP topic, by whoever lost most."""
         return self.tally.gaps(self._intake.gaps)
 
     def rejected(self) -> dict[str, int]:
-        """Messages that were rejected, by topic, summed over those who rejected them."""
+        """Count messages that were rejected, by topic, summed over those who rejected them."""
         return self.tally.rejected(self._intake.rejected)
 
     def close(self) -> None:

@@ -44,11 +44,11 @@ class Watchdog:
         self._moved: Situation | None = None
 
     def check(self, situation: Situation) -> Ending | None:
-        """How the drive must end, if it must.
+        """Decide how the drive must end, if it must.
 
         It is stalled after STALLED_S in which its time stood still, and stuck after STUCK_S of its
         own time in which the robot, though it has a route, stayed within MIN_MOVE_M of a place: one
-        that backs away and returns gets nowhere. One that is charged stays where it is for that.
+        that backs away and returns gets nowhere. One that stays to be charged is not stuck.
         """
         if situation.is_out:
             return Ending(Outcome.OUT_OF_ENERGY, "the robot's battery is empty: see map.png")

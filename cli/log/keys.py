@@ -27,14 +27,14 @@ class Keys:
 
     @property
     def asked(self) -> bool:
-        """Whether to end."""
+        """Return whether to end."""
         return self._stop.asked
 
     @contextlib.contextmanager
     def listening(self) -> Iterator[Keys]:
-        """Read single keys from the terminal until left; nothing where standard input is none.
+        """Read single keys from the terminal until left; none if standard input is no terminal.
 
-        Raises UsageError where it is to begin paused and there is no terminal.
+        Raises UsageError if it is to begin paused and there is no terminal.
         """
         if not sys.stdin.isatty():
             if self.paused:
@@ -60,7 +60,7 @@ class Keys:
                 end.close()
 
     def wait(self, timeout_s: float) -> bool:
-        """Wait so long, or until asked to end, to pause or to continue; whether it is to end."""
+        """Wait so long, or until asked to end, to pause or to continue. Returns whether to end."""
         if not self._wakes:
             return self._stop.wait(timeout_s)
 

@@ -167,7 +167,7 @@ def perception(
 
 
 def _frames(reader: LogReader, topic: Topic, recognised: bool) -> list[CameraFrame]:
-    """The frames on a topic, only those with percepts where these are needed."""
+    """Return the frames on a topic, only those with percepts if `recognised`."""
     with bar(f"reading {reader.path.name}") as progress:
         found = views.camera_frames(reader, topic, progress)
     return views.with_percepts(reader, found) if recognised else found
@@ -176,7 +176,7 @@ def _frames(reader: LogReader, topic: Topic, recognised: bool) -> list[CameraFra
 def _chosen(
     reader: LogReader, frames: list[CameraFrame], number: int | None, at_s: float | None
 ) -> CameraFrame | None:
-    """The frame that the options name, None where they name none. Raises UsageError."""
+    """Choose the frame that the options name; None if they name none. Raises UsageError."""
     if number is not None and at_s is not None:
         raise click.UsageError("--frame and --at both name a view: leave one out")
     if number is not None:
@@ -189,7 +189,7 @@ def _chosen(
 def _output(
     output: Path | None, log: Path, frame: CameraFrame, kind: str, suffixes: tuple[str, ...]
 ) -> Path:
-    """The file to write. Raises UsageError if it cannot be one of the kinds in `suffixes`."""
+    """Name the file to write. Raises UsageError if it cannot be one of the kinds in `suffixes`."""
     path = output or Path(f"{log.stem}-frame-{frame.number}-{kind}{suffixes[0]}")
     check_picture("-o", path, suffixes)
     return path

@@ -83,7 +83,7 @@ def draw_map(log: Path, output: Path | None) -> None:
 
 
 def _followed(reader: LogReader) -> tuple[RecordedMetrics, Tally]:
-    """The metrics of the drive in a log, and the tally of its messages. Raises LogError.
+    """Compute the metrics of the drive in a log, and tally its messages. Raises LogError.
 
     Warns of what the log lacks for them.
     """
@@ -121,5 +121,5 @@ def _followed(reader: LogReader) -> tuple[RecordedMetrics, Tally]:
 
 
 def _no_snapshot(_request: SnapshotRequest) -> Fetched:
-    """A log has no workspace to ask."""
+    """Raise NoAnswerError: a log has no workspace to ask."""
     raise NoAnswerError("a log holds no snapshots")

@@ -42,7 +42,7 @@ _lines = msgspec.json.Decoder(Line)
 
 
 def written(records: Iterable[Record], count: int) -> Iterator[bytes]:
-    """The lines of an export of `count` records."""
+    """Yield the lines of an export of `count` records."""
     yield _encoded(Head(FORMAT, VERSION, count))
     for sequence, record in enumerate(records, start=1):
         line = Line(record.key, record.kind, record.payload, digest_of(record, sequence))
@@ -50,7 +50,7 @@ def written(records: Iterable[Record], count: int) -> Iterator[bytes]:
 
 
 def head(path: Path, line: bytes) -> Head:
-    """The head of the export at `path`. Raises StorageError where it is none of ours."""
+    """Parse the head of the export at `path`. Raises StorageError if it is none of ours."""
     found = _decoded(_heads, line)
     if found is None:
         raise StorageError(
@@ -67,9 +67,9 @@ def head(path: Path, line: bytes) -> Head:
 
 
 def records(path: Path, lines: Iterable[bytes], count: int) -> Iterator[Record]:
-    """The records of the `lines` after the head, which are to be `count`.
+    """Yield the records of the `lines` after the head, which are to be `count`.
 
-    Raises StorageError at a line that is damaged, by its number in the file, and at the end where
+    Raises StorageError at a line that is damaged, by its number in the file, and at the end if
     lines are missing or too many.
     """
     sequence = 0
@@ -88,7 +88,7 @@ def records(path: Path, lines: Iterable[bytes], count: int) -> Iterator[Record]:
 
 
 def _record(line: bytes, sequence: int) -> Record | None:
-    """The record in a line; None where the line is damaged."""
+    """Decode the record in a line; None if the line is damaged."""
     found = _decoded(_lines, line)
     if found is None:
         return None
@@ -102,7 +102,7 @@ def _encoded(line: Head | Line) -> bytes:
 
 
 def _decoded(decoder: msgspec.json.Decoder[T], line: bytes) -> T | None:
-    """What a line holds; None where it is damaged."""
+    """Decode what a line holds; None if it is damaged."""
     try:
         return decoder.decode(line)
     except (msgspec.MsgspecError, UnicodeDecodeError):

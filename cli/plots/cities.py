@@ -43,8 +43,8 @@ SCALE_M = 200.0
 
 
 def figure(maps: Sequence[CityMap], metrics: dict[str, Any]) -> Figure:
-    """The sheet: errors on top; below, true and learned maps, a column each, of at most MAX_SHEETS
-    of them, from the shortest tour to the longest.
+    """Draw the sheet: errors on top; below, true and learned maps, a column each, of at most
+    MAX_SHEETS of them, from the shortest tour to the longest.
     """
     ordered = sorted(maps, key=lambda each: each.environment.tour_m)
     picks = np.linspace(0, len(ordered) - 1, min(MAX_SHEETS, len(ordered))).round().astype(int)
@@ -125,7 +125,7 @@ def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
 
 
 def _draw_maps(column: Sequence[Axes], each: CityMap) -> None:
-    """The truth, the map as it was learned, and with its loop closed, of the median traversal."""
+    """Draw the truth and, of the median traversal, the map as learned and with its loop closed."""
     one = each.typical
     environment = each.environment
     tour = np.vstack(environment.legs_m)

@@ -30,7 +30,7 @@ OPTIMAL = TRUE
 
 
 def figure(found: Outcome) -> Figure:
-    """The sheet: the room, the responses, and their SD and RMSE by condition."""
+    """Draw the sheet: the room, the responses, and their SD and RMSE by condition."""
     noise = found.noise
     title = (
         f"Cue integration in Nardini's room, {len(found.errors_m[Condition.BOTH])} trials a "
@@ -55,7 +55,7 @@ def figure(found: Outcome) -> Figure:
 
 
 def _draw_room(axes: Axes) -> None:
-    """The room from above, and one of the ways through it."""
+    """Draw the room from above, and one of the ways through it."""
     axes.plot(
         *np.array([START, *(POSTS[post] for post in ROUTES[0])]).T,
         color=FAINT,
@@ -75,7 +75,7 @@ def _draw_room(axes: Axes) -> None:
 
 
 def _draw_responses(axes: Axes, found: Outcome) -> None:
-    """Where the post was put, all routes laid over each other, with one SD about the mean."""
+    """Draw where the post was put, all routes laid over each other, with one SD about the mean."""
     for condition, errors_m in found.errors_m.items():
         colour = COLOURS[condition]
         axes.plot(*errors_m.T, ".", ms=3, color=colour, alpha=0.5)

@@ -33,7 +33,7 @@ TICKS = (1.0, 2.0, 5.0)
 
 
 def encode_image(image: Image, suffix: str) -> bytes:
-    """The bytes of an image file of the kind that `suffix` names."""
+    """Encode an image as a file of the kind that `suffix` names."""
     _, data = cv2.imencode(suffix, cv2.cvtColor(image, cv2.COLOR_RGB2BGR))
     return data.tobytes()
 
@@ -41,8 +41,8 @@ def encode_image(image: Image, suffix: str) -> bytes:
 def draw_view(
     image: Image, depth_m: Depth | None, camera: Calibration, objects: list[Percept]
 ) -> Image:
-    """The image, or `depth_m` with a scale beside it, each pixel several wide, and `objects` over
-    it.
+    """Draw the image, or `depth_m` with a scale beside it, each pixel several wide, and over it
+    `objects`.
     """
     height, width = image.shape[:2] if depth_m is None else depth_m.shape
     times = max(1, round(WIDE_PX / width))
@@ -68,13 +68,13 @@ def draw_view(
 
 
 def show(axes: Axes, image: Image) -> None:
-    """An image, each pixel a square."""
+    """Draw an image, each pixel a square."""
     axes.imshow(image, interpolation="nearest", aspect="equal")
 
 
 def show_depth(axes: Axes, depth_m: Depth, camera: Calibration) -> AxesImage:
-    """Depth in colours that go by its logarithm, as far as it is measured by some pixels; where
-    unknown, grey.
+    """Draw depth in colours that go by its logarithm, as far as it is measured by some pixels of
+    disparity; unknown depth is grey.
     """
     known = depth_m[depth_m > 0]
     nearest_m = float(np.quantile(known, NEAREST_SHARE)) if known.size else 1.0
@@ -87,7 +87,7 @@ def show_depth(axes: Axes, depth_m: Depth, camera: Calibration) -> AxesImage:
 
 
 def add_scale(scale: Axes, shown: AxesImage) -> Colorbar:
-    """Which depth a colour of `shown` is, drawn in the axes `scale`."""
+    """Draw in the axes `scale` which depth a colour of `shown` is."""
     figure = scale.get_figure(root=True)
     assert figure is not None
     bar = figure.colorbar(shown, cax=scale, extend="both", ticks=LogLocator(subs=TICKS))
@@ -100,12 +100,12 @@ def add_scale(scale: Axes, shown: AxesImage) -> Colorbar:
 
 
 def colours_of(objects: list[Percept]) -> list[str]:
-    """A colour for each, the same wherever they are drawn."""
+    """Choose a colour for each, the same wherever they are drawn."""
     return [SEVERAL[number % len(SEVERAL)] for number in range(len(objects))]
 
 
 def draw_objects(axes: Axes, objects: list[Percept], opacity: float) -> None:
-    """What is seen of each object, filled and outlined."""
+    """Draw what is seen of each object, filled and outlined."""
     for percept, colour in zip(objects, colours_of(objects), strict=True):
         corners = outline_px(percept)
         axes.add_patch(
@@ -119,7 +119,7 @@ def draw_objects(axes: Axes, objects: list[Percept], opacity: float) -> None:
 
 
 def name_objects(axes: Axes, objects: list[Percept], size: float) -> None:
-    """The name of each object, with its activation and its distance. The layout must be settled."""
+    """Write each object's name, its activation and its distance. The layout must be settled."""
     labels = []
     for percept, colour in zip(objects, colours_of(objects), strict=True):
         corners = outline_px(percept)
@@ -131,12 +131,12 @@ def name_objects(axes: Axes, objects: list[Percept], size: float) -> None:
 
 
 def spoken(label: str) -> str:
-    """A label as people write it."""
+    """Write a label as people do."""
     return label.replace("_", " ")
 
 
 def outline_px(percept: Percept) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Corners (n, 2), column and row: of the percept's outline, or of its box where it has none."""
+    """Return corners (n, 2), column and row, of the outline, or of the box if there is none."""
     if len(percept.outline_px) > 2:
         return np.array(percept.outline_px, np.float64)
     left, top, width, height = percept.box_px

@@ -30,20 +30,20 @@ _SHIFT = 4
 
 
 def points(array: Array) -> Floats:
-    """Ground points (n, 2), none where the array holds something else."""
+    """Return ground points (n, 2), none if the array holds something else."""
     fits = len(array.shape) == 2 and array.shape[1] == 2
     return array.numpy().astype(np.float64) if fits else np.empty((0, 2))
 
 
 def cells(road_m: Floats) -> Floats:
-    """The corners (n, 4, 2) of the ground cells that `road_m` fall into."""
+    """Return the corners (n, 4, 2) of the ground cells that `road_m` fall into."""
     corner = np.floor(road_m / CELL_M)[:, None] * CELL_M
     return np.asarray(corner + CELL_M * np.array([(0, 0), (1, 0), (1, 1), (0, 1)]))
 
 
 def to_image(ground_m: Floats, camera: Calibration) -> Floats:
-    """Column and row (n, 2) of ground points (n, 2), as a level camera sees them; nearer than
-    NEAREST_M at that.
+    """Compute column and row (n, 2) of ground points (n, 2), as a level camera sees them; nearer
+    than NEAREST_M as if at that distance.
     """
     ahead_m = np.maximum(ground_m[:, 0] - camera.mount_forward_m, NEAREST_M)
     column = camera.cx_px - camera.fx_px * ground_m[:, 1] / ahead_m
@@ -51,7 +51,7 @@ def to_image(ground_m: Floats, camera: Calibration) -> Floats:
 
 
 def draw_road_in_image(axes: Axes, percepts: Percepts, camera: Calibration) -> None:
-    """The road's cells laid over the image, and points where it ends."""
+    """Draw the road's cells over the image, and points where it ends."""
     size = (FINER * camera.height_px, FINER * camera.width_px)
     mask = np.zeros(size, np.uint8)
     corners = cells(points(percepts.road_m)).reshape(-1, 2)
@@ -69,8 +69,8 @@ def draw_road_in_image(axes: Axes, percepts: Percepts, camera: Calibration) -> N
 
 
 def draw_plan(axes: Axes, percepts: Percepts, camera: Calibration) -> None:
-    """Road, where it ends, and objects with twice their standard deviations, from above, the robot
-    looking up.
+    """Draw the road, where it ends, and objects with twice their standard deviations, from above,
+    the robot looking up.
     """
     farthest_m = _farthest_m(percepts)
     far_m = 3 * farthest_m
@@ -121,7 +121,7 @@ def draw_plan(axes: Axes, percepts: Percepts, camera: Calibration) -> None:
 
 
 def fit_plan(axes: Axes, percepts: Percepts) -> None:
-    """Limits that hold all, a metre as long across as ahead. The layout must be settled."""
+    """Set limits that hold all, a metre as long across as ahead. The layout must be settled."""
     sides_m = [
         2 * abs(float(_position_m(percept)[1])) + 2 * MARGIN_M for percept in percepts.objects
     ]
@@ -134,7 +134,7 @@ def fit_plan(axes: Axes, percepts: Percepts) -> None:
 
 
 def name_in_plan(axes: Axes, objects: list[Percept], size: float) -> None:
-    """The names of the objects in the plan. Layout and limits must be settled."""
+    """Write the names of the objects in the plan. Layout and limits must be settled."""
     labels = []
     for percept, colour in zip(objects, colours_of(objects), strict=True):
         x, y = _from_above(_position_m(percept)[None])[0].tolist()
@@ -151,7 +151,7 @@ def _position_m(percept: Percept) -> Floats:
 
 
 def _from_above(robot_m: Floats) -> Floats:
-    """Points in the robot's frame (n, 2) as they are drawn: rightwards, then forwards."""
+    """Turn points in the robot's frame (n, 2) into those to draw: rightwards, then forwards."""
     return np.stack([-robot_m[:, 1], robot_m[:, 0]], axis=1)
 
 

@@ -26,7 +26,7 @@ from cogmap.experiments.loop_closing.run import SENSING
 
 
 def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
-    """The sheet: the map before, right after, and in the end with headings; below, the first
+    """Draw the sheet: the map before, right after, and in the end with headings; below, the first
     replay.
     """
     positions = loops["positions"]
@@ -82,7 +82,7 @@ def _draw_map(axes: Axes, drawn: Map, colour: str, title: str) -> None:
 
 
 def _draw_shifts(axes: Axes, before: Map, after: Map) -> None:
-    """From where some places were taken to be, to where they are now."""
+    """Draw lines from where some places were taken to be, to where they are now."""
     count = min(len(before.path_m), len(after.path_m))
     lines = np.stack([before.path_m[:count], after.path_m[:count]], axis=1)[:: max(1, count // 40)]
     axes.add_collection(LineCollection(list(lines), colors=FAINT, linewidths=0.7, zorder=2))
@@ -96,8 +96,8 @@ def _draw_replay(axes: Axes, replay: Replayed) -> None:
 
 
 def _draw_synapses(axes: Axes, replay: Replayed, metrics: dict[str, Any]) -> None:
-    """Pairs of place fields near one another; those brought together from afar lie far outside,
-    near 1.
+    """Plot pairs of place fields near one another; those brought together from afar would lie far
+    outside, near 1.
     """
     nearer = replay.nearer_m[replay.close]
     changes = replay.strength_changes[replay.close]

@@ -66,7 +66,7 @@ def draw(path: Path, observer: Observer, graph: Graph, metrics: RecordedMetrics)
 def _dress(
     axes: Axes, observer: Observer, metrics: RecordedMetrics, structure: list[Line2D]
 ) -> None:
-    """Limits, scale, title and legend."""
+    """Set limits, scale, title and legend."""
     town = observer.town
     corners = [point for street in (town.streets if town else []) for point in street.line_m]
     for building in town.buildings if town else []:
@@ -140,7 +140,7 @@ def _dress(
 
 
 def _charging_legend(metrics: RecordedMetrics) -> list[Line2D]:
-    """That of charging places, where the robot's battery runs down."""
+    """Return the legend of charging places, if the robot's battery runs down."""
     if metrics.energy is None:
         return []
     return [Line2D([], [], label="charging place", **CHARGING_MARKER)]

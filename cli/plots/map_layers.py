@@ -17,7 +17,7 @@ from cogmap.schemas.sensing import Pose
 
 
 def draw_road(axes: Axes, observer: Observer, graph: Graph) -> None:
-    """The place nodes' road column, cell by cell."""
+    """Draw the place nodes' road column, cell by cell."""
     red, green, blue = to_rgb(ROAD)
     pose = observer.map_frame or Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
     frame = Affine2D().rotate(pose.heading_rad).translate(pose.x_m, pose.y_m) + axes.transData
@@ -38,8 +38,8 @@ def draw_road(axes: Axes, observer: Observer, graph: Graph) -> None:
 
 
 def draw_objects(axes: Axes, observer: Observer, graph: Graph) -> None:
-    """Each object node with its samples, twice their standard deviation, and a line to the building
-    of its name.
+    """Draw each object node with its samples, twice their standard deviation, and a line to the
+    building of its name.
     """
     buildings = (
         {building.name: building.pose for building in observer.town.buildings}

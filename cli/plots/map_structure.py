@@ -34,7 +34,7 @@ MIN_CORNERS = 3
 
 
 def draw_structure(axes: Axes, observer: Observer, graph: Graph) -> list[Line2D]:
-    """All of these layers, and the lines of the legend for those that there are."""
+    """Draw all of these layers. Returns the lines of the legend for those that there are."""
     legend = []
     if _draw_cuts(axes, observer, graph):
         legend.append(Line2D([], [], color=CUT, lw=1.4, label="links cut"))
@@ -52,7 +52,7 @@ def draw_structure(axes: Axes, observer: Observer, graph: Graph) -> list[Line2D]
 
 
 def _draw_cuts(axes: Axes, observer: Observer, graph: Graph) -> bool:
-    """Each straight link that is cut as the side that its two place nodes share."""
+    """Draw each straight link that is cut as the side that its two place nodes share."""
     extent = graph.places.extent(ROOT_MAP)
     window = graph.places.window(ROOT_MAP, WEIGHT_COLUMNS, extent)
     weights = window.weights()
@@ -74,7 +74,7 @@ def _draw_cuts(axes: Axes, observer: Observer, graph: Graph) -> bool:
 
 
 def _draw_sub_maps(axes: Axes, observer: Observer, graph: Graph) -> bool:
-    """The hull of the objects of each sub-map, and those of its place nodes that are road."""
+    """Draw the hull of the objects of each sub-map, and those of its place nodes that are road."""
     others = [node for node in graph.of_kind(Map) if node.id != ROOT_MAP]
     maps = [node for node in others if not is_coarse_map(node.id)]
     has_any = False
@@ -99,7 +99,7 @@ def _draw_sub_maps(axes: Axes, observer: Observer, graph: Graph) -> bool:
 
 
 def _hull_m(points_m: Floats) -> Floats | None:
-    """The corners of the convex hull of (n, 2) points; None where they span no area."""
+    """Return the corners of the convex hull of (n, 2) points; None if they span no area."""
     if len(points_m) < MIN_CORNERS:
         return None
 
@@ -111,7 +111,7 @@ def _hull_m(points_m: Floats) -> Floats | None:
 
 
 def _draw_goals(axes: Axes, observer: Observer, graph: Graph) -> bool:
-    """A star where each goal is, filled where it was reached."""
+    """Draw a star where each goal is, filled if it was reached."""
     goals = list(graph.of_kind(Goal))
     for goal in goals:
         where = graph.get(Object, object_id(goal.object)) if goal.object else None
@@ -124,7 +124,7 @@ def _draw_goals(axes: Axes, observer: Observer, graph: Graph) -> bool:
 
 
 def _draw_plan(axes: Axes, observer: Observer, graph: Graph) -> bool:
-    """The route of the plan as it is now."""
+    """Draw the route of the plan as it is now."""
     plan = graph.get(Plan, PLAN_ID)
     if plan is None or plan.route is None:
         return False
@@ -135,7 +135,7 @@ def _draw_plan(axes: Axes, observer: Observer, graph: Graph) -> bool:
 
 
 def _draw_shortcuts(axes: Axes, observer: Observer) -> bool:
-    """The way to goals where it leads through streets in which the robot had not been before."""
+    """Draw the parts of the way to goals through streets in which the robot had not been before."""
     steps_m = observer.shortcuts_m
     axes.add_collection(LineCollection(list(steps_m), colors=SHORTCUT, linewidths=9.0, zorder=8.8))
     return bool(len(steps_m))

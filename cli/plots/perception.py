@@ -29,7 +29,7 @@ MOSAIC: Any = [["camera", "depth", "plan"], ["segments", "road", "plan"]]
 def figure(
     view: View, image: Image, depth_m: Depth, percepts: Percepts, title: str, suffix: str
 ) -> bytes:
-    """The file, of the kind that `suffix` names."""
+    """Draw the figure, as a file of the kind that `suffix` names."""
     with mpl.rc_context(draw.STYLE):
         layout = ConstrainedLayoutEngine(h_pad=0.08, w_pad=0.05)
         sheet = Figure(figsize=(13, 7.3), dpi=130, facecolor=PAPER, layout=layout)
@@ -55,13 +55,13 @@ def figure(
 
 
 def _paler(image: Image) -> Image:
-    """Greyer and lighter, so that what is drawn over it stands out."""
+    """Make an image greyer and lighter, so that what is drawn over it stands out."""
     grey = image.mean(axis=2, keepdims=True)
     return np.asarray(255 - PALER * (255 - (0.75 * grey + 0.25 * image)), np.uint8)
 
 
 def _dress(sheet: Figure, panels: dict[str, Axes], percepts: Percepts, title: str) -> None:
-    """Titles, ticks and the legend."""
+    """Set titles, ticks and the legend."""
     places = [
         f", a place seen in frame {match.frame} ({match.score:.2f})" for match in percepts.matches
     ]

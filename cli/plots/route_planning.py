@@ -51,8 +51,8 @@ PLANS = {
 
 
 def figure(human: Sequence[Planned], drawn: Sequence[Planned], metrics: dict[str, Any]) -> Figure:
-    """The sheet: above, one goal and several; below, all problems by their number of goals, and
-    those of people one by one.
+    """Draw the sheet: above, one goal and several; below, all problems by their number of goals,
+    and those of people one by one.
     """
     example = next(problem for problem in drawn if problem.goals == EXAMPLE_GOALS)
     title = (
@@ -77,7 +77,7 @@ def figure(human: Sequence[Planned], drawn: Sequence[Planned], metrics: dict[str
 
 
 def _draw_activation(axes: Axes, ground: Spread, title: str) -> None:
-    """The logarithm of the activation in colours, walls in grey, and the route up to the goal."""
+    """Draw the logarithm of the activation in colours, walls in grey, and the route to the goal."""
     activation = np.ma.masked_invalid(ground.log_activation.T)
     colours = mpl.colormaps["viridis"].with_extremes(bad=KERB)
     axes.imshow(activation, origin="lower", cmap=colours, interpolation="nearest")
@@ -90,7 +90,7 @@ def _draw_activation(axes: Axes, ground: Spread, title: str) -> None:
 
 
 def _draw_tour(axes: Axes, problem: Planned, tour: Indices, name: str, title: str) -> None:
-    """A closed tour past the goals, of one of the PLANS."""
+    """Draw a closed tour past the goals, of one of the PLANS."""
     positions = problem.positions
     line = _closed(positions, tour)
     axes.plot(*line.T, color=PLANS[name].colour, lw=1.8, zorder=3)
@@ -107,13 +107,13 @@ def _draw_tour(axes: Axes, problem: Planned, tour: Indices, name: str, title: st
 
 
 def _closed(positions: Floats, tour: Indices) -> Floats:
-    """(n + 1, 2): the line of a tour, back to where it begins."""
+    """Return the (n + 1, 2) line of a tour, back to where it begins."""
     line: Floats = positions[np.append(tour, tour[0])]
     return line
 
 
 def _draw_grids(axes: Axes, positions: Floats, settings: TourSettings) -> None:
-    """The two coarsest grids, as they lie over the problem where they are not turned."""
+    """Draw the two coarsest grids, as they lie over the problem if they are not turned."""
     lowest = positions.min(axis=0)
     highest = positions.max(axis=0)
     side = float(np.max(highest - lowest))
@@ -127,7 +127,7 @@ def _draw_grids(axes: Axes, positions: Floats, settings: TourSettings) -> None:
 
 
 def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
-    """Means over the problems of each size, beside published ones."""
+    """Draw means over the problems of each size, beside published ones."""
     sizes = sorted({problem.goals for problem in drawn})
     for name, style in PLANS.items():
         percent = []
@@ -159,7 +159,7 @@ def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
 
 
 def _draw_people(axes: Axes, human: Sequence[Planned]) -> None:
-    """People's quartiles on each problem, the medians of the model and of the flat map."""
+    """Draw people's quartiles on each problem, the medians of the model and of the flat map."""
     describe(axes, "f   problems that people drew tours of", y="% above the shortest")
     if not human:
         _note_absence(axes)
@@ -184,12 +184,12 @@ def _draw_people(axes: Axes, human: Sequence[Planned]) -> None:
 
 
 def _medians_percent(human: Sequence[Planned], name: str) -> list[float]:
-    """The median excess on each problem, of people or of a plan."""
+    """Compute the median excess on each problem, of people or of a plan."""
     return [100 * float(np.median(getattr(problem, name))) for problem in human]
 
 
 def _draw_errors(axes: Axes, human: Sequence[Planned], metrics: dict[str, Any]) -> None:
-    """The mean excess of the model against that of people, a point each problem."""
+    """Draw the mean excess of the model against that of people, a point for each problem."""
     mean = "mean % above the shortest"
     describe(axes, "g   do they err on the same problems?", f"people, {mean}", f"model, {mean}")
     if not human:
@@ -208,7 +208,7 @@ def _draw_errors(axes: Axes, human: Sequence[Planned], metrics: dict[str, Any]) 
 
 
 def _leave_room(axes: Axes) -> None:
-    """For the legend, above what is drawn."""
+    """Leave room for the legend, above what is drawn."""
     _, top = axes.get_ylim()
     axes.set_ylim(-0.03 * top, 1.45 * top)
 

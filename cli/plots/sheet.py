@@ -17,7 +17,7 @@ from cogmap.cli.plots.palette import FAINT, INK, PAPER
 def new_sheet(
     width_in: float, height_in: float, title: str = "", dpi: float = 110
 ) -> Iterator[Figure]:
-    """A figure to draw on, with a title above its panels; it is laid out in the end."""
+    """Yield a figure to draw on, with a title above its panels; it is laid out in the end."""
     with mpl.rc_context(STYLE):
         sheet = Figure(
             figsize=(width_in, height_in), dpi=dpi, facecolor=PAPER, layout="constrained"

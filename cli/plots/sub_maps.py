@@ -27,7 +27,7 @@ PANEL_INCHES = 7.0
 
 
 def figure(found: Sequence[Structured]) -> Figure:
-    """The sheet: a map of each city, and beside it the functions of its sub-maps."""
+    """Draw the sheet: a map of each city, and beside it the functions of its sub-maps."""
     rows = -(-len(found) // COLUMNS)
     columns = min(COLUMNS, len(found))
     with new_sheet(1.4 * PANEL_INCHES * columns, PANEL_INCHES * rows) as sheet:
@@ -40,12 +40,12 @@ def figure(found: Sequence[Structured]) -> Figure:
 
 
 def colour_of(label: int) -> str:
-    """The colour of a sub-map."""
+    """Return the colour of a sub-map."""
     return SEVERAL[label % len(SEVERAL)]
 
 
 def _draw_city(axes: Axes, found: Structured) -> None:
-    """The streets, the boundaries, and the objects in the colours of their sub-maps."""
+    """Draw the streets, the boundaries, and the objects in the colours of their sub-maps."""
     city = found.city
     streets_m = city.streets.points_m[city.streets.pieces]
     axes.add_collection(LineCollection(list(streets_m), colors=STREET, linewidths=1.0, zorder=0))
@@ -74,7 +74,7 @@ def _draw_city(axes: Axes, found: Structured) -> None:
 
 
 def _draw_sub_map(axes: Axes, members_m: Floats, label: int) -> None:
-    """The objects of a sub-map, and the area that they take up, with its number."""
+    """Draw the objects of a sub-map, and the area that they take up, with its number."""
     colour = colour_of(label)
     axes.plot(*members_m.T, "o", ms=2.6, color=colour, mec="none", zorder=3)
 
@@ -101,7 +101,7 @@ def _draw_sub_map(axes: Axes, members_m: Floats, label: int) -> None:
 
 
 def _draw_functions(axes: Axes, found: Structured) -> None:
-    """Of each sub-map, from the largest: how many of its objects have which function."""
+    """Draw for each sub-map, from the largest, how many of its objects have which function."""
     labels = _by_size(found.labels)[:MAX_BARS]
     places = np.arange(len(labels))
     left = np.zeros(len(labels))
@@ -126,7 +126,7 @@ def _draw_functions(axes: Axes, found: Structured) -> None:
 
 
 def _by_size(labels: Indices) -> Indices:
-    """The labels of sub-maps, from the largest."""
+    """Return the labels of sub-maps, from the largest."""
     names, sizes = np.unique(labels, return_counts=True)
     ordered: Indices = names[np.argsort(-sizes, kind="stable")]
     return ordered

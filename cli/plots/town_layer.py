@@ -29,7 +29,7 @@ MAX_NAMES = 40
 
 
 def draw_town(axes: Axes, town: TrueTown) -> None:
-    """Streets, obstacles and buildings, those of one district in one tint, and what is closed."""
+    """Draw streets, obstacles, buildings (those of a district in one tint), and what is closed."""
     for wider_m, colour, order in ((1.0, KERB, 1.0), (0.0, STREET, 1.1)):
         for street in town.streets:
             line_m = np.array(street.line_m)
@@ -53,7 +53,7 @@ def draw_town(axes: Axes, town: TrueTown) -> None:
 
 
 def _tints(town: TrueTown) -> dict[str, Colour]:
-    """The colour of each district's buildings."""
+    """Choose the colour of each district's buildings."""
     tints: dict[str, Colour] = {"": to_rgb(HOUSE)}
     districts = {building.district for building in town.buildings} - {""}
     for number, district in enumerate(sorted(districts)):
@@ -69,7 +69,7 @@ def _tints(town: TrueTown) -> dict[str, Colour]:
 def _draw_band(
     axes: Axes, ends_m: tuple[Points, Points], width_m: float, colour: str, order: float
 ) -> None:
-    """A stretch of street, its ends reaching half a width further, so that corners close."""
+    """Draw a stretch of street; its ends reach half a width further, so that corners close."""
     start_m, end_m = ends_m
     along_m = end_m - start_m
     length_m = float(np.hypot(*along_m)) + width_m
@@ -87,7 +87,7 @@ def _draw_box(
     heading_rad: float,
     style: dict[str, Any],
 ) -> None:
-    """A rectangle; `size_m`: along its heading, and across it."""
+    """Draw a rectangle; `size_m` is its size along its heading, and across it."""
     x_m, y_m = np.asarray(middle_m, float).tolist()
     length_m, width_m = size_m
     turned = Affine2D().rotate(heading_rad).translate(x_m, y_m) + axes.transData
@@ -125,7 +125,7 @@ def _draw_building(axes: Axes, building: Building, colour: Colour) -> None:
 
 
 def _draw_name(axes: Axes, building: Building) -> None:
-    """Its name, along the lower side."""
+    """Write a building's name along its lower side."""
     pose = building.pose
     by_width_m = abs(building.width_m * math.sin(pose.heading_rad))
     by_depth_m = abs(building.depth_m * math.cos(pose.heading_rad))
@@ -139,7 +139,7 @@ def _draw_name(axes: Axes, building: Building) -> None:
 
 
 def _draw_barrier(axes: Axes, street: Street) -> None:
-    """A bar across the middle of a street."""
+    """Draw a bar across the middle of a street."""
     start_m, end_m = np.array(street.line_m)[[0, -1]]
     along_m = end_m - start_m
     across_rad = math.atan2(along_m[0], -along_m[1])

@@ -49,7 +49,7 @@ class Start:
 def run_drive(start: Start, server: ForkServer | None) -> int:
     """Drive, and print the summary. Returns the exit code; `server` forks the processes.
 
-    Raises UsageError where it cannot be done so, and StorageError where a file cannot be written.
+    Raises UsageError if it cannot be done so, and StorageError if a file cannot be written.
     """
     stop = Stop()
     choices = start.choices
@@ -79,7 +79,7 @@ def run_drive(start: Start, server: ForkServer | None) -> int:
 
 
 def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
-    """The time limit of a drive with these settings of the simulation.
+    """Return the time limit of a drive with these settings of the simulation.
 
     It grows with each lap, and is one lap's at least; without laps it is the drive's duration, and
     time to start and to end.
@@ -111,8 +111,8 @@ def _introduce(screen: Display, drive: Drive) -> None:
 
 
 def _new_folder(out: Path | None) -> Path:
-    """`out`, or a folder of RUNS named after the time, which RUNS/latest then links to. Raises
-    ConfigError where it exists or cannot be made.
+    """Make `out`, or a folder of RUNS named after the time, which RUNS/latest then links to. Raises
+    ConfigError if it exists or cannot be made.
     """
     folder = out or RUNS / time.strftime("%Y-%m-%d-%H%M%S")
     try:
@@ -132,7 +132,7 @@ def _new_folder(out: Path | None) -> Path:
 
 @contextmanager
 def _writing(folder: Path) -> Iterator[None]:
-    """Raise StorageError where a file of `folder` cannot be written."""
+    """Raise StorageError if a file of `folder` cannot be written."""
     try:
         yield
     except OSError as error:

@@ -59,7 +59,7 @@ def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
 
 
 def table(metrics: RunMetrics, folder: Path) -> Table:
-    """The metrics that matter most."""
+    """Tabulate the metrics that matter most."""
     reason = metrics.reason
     if not reason.startswith(metrics.ended_by):
         reason = f"{metrics.ended_by}: {reason}"
@@ -71,7 +71,7 @@ def table(metrics: RunMetrics, folder: Path) -> Table:
 
 
 def recorded_table(metrics: RecordedMetrics, log: Path) -> Table:
-    """The metrics that matter most, of a log."""
+    """Tabulate the metrics that matter most, of a log."""
     rows = [*drive_rows(metrics), *_loss_rows(metrics, "the recording was not finished")]
     return _table(str(log), rows)
 
@@ -84,7 +84,7 @@ def _table(title: str, rows: list[tuple[str, str]]) -> Table:
 
 
 def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
-    """The rows of the table about the drive."""
+    """Make the rows of the table about the drive."""
     driven = f"{metrics.distance_m:.1f} m in {metrics.drive_s:.1f} s"
     if metrics.goals:
         driven = f"{driven}, {metrics.goals_reached} of {metrics.goals} goals reached"
@@ -126,7 +126,7 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
 
 
 def _first(words: Sequence[str], separator: str) -> str:
-    """The first few of `words`, and the number of the others."""
+    """Join the first few of `words`, and the number of the others."""
     shown = list(words[:NAMED])
     if len(words) > NAMED:
         shown.append(f"and {len(words) - NAMED} more")
@@ -140,8 +140,8 @@ def _errors(errors: ErrorMetrics) -> str:
 
 
 def _loss_rows(metrics: RecordedMetrics, without_log: str) -> list[tuple[str, str]]:
-    """The rows about messages that were lost, by the counts of the modules and of the recorder, and
-    about answers that were dropped.
+    """Make the rows about messages that were lost, by the counts of the modules and of the
+    recorder, and about answers that were dropped.
     """
     log = metrics.log
     lost = f"{metrics.gaps_total}; {without_log}"

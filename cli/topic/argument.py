@@ -11,7 +11,7 @@ from cogmap.schemas.topics import Delivery, Topic
 
 
 def topic_named(name: str) -> Topic:
-    """The topic `name`, which may begin with a slash. Raises UsageError naming the nearest."""
+    """Find the topic `name`, which may begin with a slash. Raises UsageError naming the nearest."""
     found = topics.BY_NAME.get(name.strip("/"))
     if found is not None:
         return found
@@ -21,7 +21,7 @@ def topic_named(name: str) -> Topic:
 
 
 def streamed_topic(name: str) -> Topic:
-    """The topic `name`, which must be one that is published. Raises UsageError."""
+    """Find the topic `name`, which must be one that is published. Raises UsageError."""
     topic = topic_named(name)
     if topic.delivery is Delivery.ON_REQUEST:
         raise UsageError(

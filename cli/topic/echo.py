@@ -94,7 +94,7 @@ class ValidMessages:
         self._topic = topic
 
     def take(self, timeout_s: float) -> Message | None:
-        """The next one; None where there is none within `timeout_s`."""
+        """Take the next one; None if there is none within `timeout_s`."""
         arrival = self.inbox.take(timeout_s)
         if not isinstance(arrival, Arrival):
             return None
@@ -115,7 +115,7 @@ class ValidMessages:
 
 
 def formatter(paths: Sequence[str], full: bool, no_arrays: bool, style: str) -> Format:
-    """A function that turns a message into text, JSON or CSV.
+    """Make a function that turns a message into text, JSON or CSV.
 
     With a path it turns the part there, with several the parts by their paths. It raises UsageError
     if the message has no such part.
@@ -147,7 +147,7 @@ def formatter(paths: Sequence[str], full: bool, no_arrays: bool, style: str) -> 
 
 
 def without_arrays(part: Any) -> Any:
-    """`part` as dicts, lists and scalars, each array in it as its type and shape."""
+    """Return `part` as dicts, lists and scalars, each array in it as its type and shape."""
     if isinstance(part, Array | Matrix):
         return f"<array type: {part.dtype}{list(part.shape)}>"
     if isinstance(part, msgspec.Struct):
@@ -162,7 +162,7 @@ def without_arrays(part: Any) -> Any:
 
 
 def comma_separated(part: Any) -> str:
-    """All scalars in `part`, in order, as one line of CSV."""
+    """Write all scalars in `part`, in order, as one line of CSV."""
 
     def scalars(part: Any) -> Iterator[Any]:
         if isinstance(part, dict):

@@ -94,7 +94,7 @@ def find(type_name: str) -> None:
 
 
 def counts(system: System, role: Role) -> str:
-    """The topics for which processes have a role, and how many have it."""
+    """List the topics for which processes have a role, and how many have it."""
     title, noun = ROLES[role]
     lines = [title]
     for topic in system.topics():
@@ -106,7 +106,7 @@ def counts(system: System, role: Role) -> str:
 
 
 def facts(system: System, topic: Topic) -> dict[str, Any]:
-    """A topic and who uses it, as programs read it."""
+    """Describe a topic and who uses it, as programs read it."""
     found: dict[str, Any] = {
         "topic": topic.name,
         "type": topic.type.__name__,

@@ -43,7 +43,7 @@ class Receptions:
         self._queue.put(Reception(arrival))
 
     def take(self, timeout_s: float) -> Reception | None:
-        """The next one; None where there is none within `timeout_s`."""
+        """Take the next one; None if there is none within `timeout_s`."""
         try:
             return self._queue.get(timeout=timeout_s)
         except Empty:
@@ -62,7 +62,7 @@ class RouterWatch:
         self._missing_since_s: float | None = None
 
     def check(self) -> None:
-        """Raise NoRouterError where the checks of the last `timeout_s` found no router."""
+        """Raise NoRouterError if the checks of the last `timeout_s` found no router."""
         if self._session.info.routers_zid():
             self._missing_since_s = None
             return

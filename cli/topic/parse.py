@@ -18,7 +18,7 @@ from cogmap.schemas.topics import Topic
 
 
 def parse(topic: Topic, text: str) -> Message:
-    """The message of `topic` in `text`; an array is `{dtype, shape, data}`, data as nested lists.
+    """Parse a message of `topic`; an array is `{dtype, shape, data}`, data as nested lists.
 
     Raises UsageError naming what was expected, what was found, and where.
     """
@@ -36,7 +36,7 @@ def parse(topic: Topic, text: str) -> Message:
 
 
 def _read(text: str) -> Any:
-    """JSON comes first: YAML reads 1e4 as a string."""
+    """Read JSON or YAML. JSON comes first: YAML reads 1e4 as a string."""
     with contextlib.suppress(msgspec.DecodeError):
         return msgspec.json.decode(text)
     try:
@@ -67,7 +67,7 @@ def _packed(array: dict[str, Any]) -> dict[str, Any]:
 
 
 def _unknown(given: Any, parsed: Any, where: str) -> str | None:
-    """A sentence about the first key in `given` that the message has no field for."""
+    """Write a sentence about the first key in `given` that the message has no field for."""
     if isinstance(given, dict) and isinstance(parsed, dict):
         for key in given:
             if key not in parsed:

@@ -21,7 +21,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 def window_option(default: int) -> Callable[[F], F]:
-    """The option for how many messages the statistics are over."""
+    """Make the option for how many messages the statistics are over."""
     return click.option(
         "-w",
         "--window",

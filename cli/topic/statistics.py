@@ -53,11 +53,11 @@ class Statistics(ABC):
 
     @abstractmethod
     def text(self) -> str:
-        """The statistics so far, as people read them; empty before `min_messages`."""
+        """Write the statistics so far, as people read them; empty before `min_messages`."""
 
     @abstractmethod
     def plain(self) -> dict[str, Any]:
-        """The statistics so far, as programs read them."""
+        """Return the statistics so far, as programs read them."""
 
 
 class Rate(Statistics):
@@ -72,7 +72,7 @@ class Rate(Statistics):
         self._times_ns.append(reception.received_ns)
 
     def periods_s(self) -> Spread | None:
-        """The times between messages; None before the second. The rate is one over their mean."""
+        """Measure periods of messages; None before the second. The rate is one over their mean."""
         return Spread.of(np.diff(np.fromiter(self._times_ns, np.int64)) / 1e9)
 
     def text(self) -> str:
@@ -103,8 +103,8 @@ class Bandwidth(Statistics):
         self._arrivals.append((reception.received_ns, reception.size_bytes))
 
     def bytes_per_s(self) -> float | None:
-        """The bytes after the first message of the window, over the time from it to the last; None
-        before the second.
+        """Divide the bytes after the first message of the window by the time from it to the last;
+        None before the second.
         """
         if len(self._arrivals) < self.min_messages:
             return None
@@ -115,7 +115,7 @@ class Bandwidth(Statistics):
         return sum(size for _, size in later) / max(MIN_SPAN_S, span_s)
 
     def sizes_bytes(self) -> Spread | None:
-        """The sizes of messages. None before the first one."""
+        """Return the spread of the sizes of messages. None before the first one."""
         return Spread.of(size for _, size in self._arrivals)
 
     def text(self) -> str:
@@ -151,15 +151,15 @@ class Delay(Statistics):
             self._stages.append(envelope.stages)
 
     def ages_s(self) -> Spread | None:
-        """The times from the sensing to here. None before the first message."""
+        """Return the spread of times from the sensing to here. None before the first message."""
         return Spread.of(self._ages_s)
 
     def last_leg_s(self) -> Spread | None:
-        """The times from the last publisher to here. None before the first message."""
+        """Return the spread of the times from the last publisher to here. None before the first."""
         return Spread.of(self._last_leg_s)
 
     def stages_s(self) -> dict[str, tuple[float, float]]:
-        """For each module passed, mean times of computing and of encoding, transport and queues."""
+        """Average each passed module's times of computing and of encoding, transport and queues."""
         times_s: dict[str, list[tuple[float, float]]] = {}
         for stages in self._stages:
             for module, compute_ns, rest_ns in stages:
@@ -200,7 +200,7 @@ class Delay(Statistics):
 
 
 def in_bytes(size: float) -> str:
-    """`size` bytes with the unit that leaves at most three digits before the point."""
+    """Format `size` bytes with the unit that leaves at most three digits before the point."""
     if abs(size) < 1000:
         return f"{size:.0f} B"
 

@@ -75,7 +75,7 @@ def encode(message: msgspec.Struct) -> bytes:
 def decode(topic: Topic, payload: bytes | memoryview) -> Message:
     """Return the message in `payload`, validated.
 
-    Raises MessageError that names the topic, what was expected and if.
+    Raises MessageError that names the topic, what was expected and where.
     """
     if len(payload) > topic.max_bytes:
         raise MessageError(

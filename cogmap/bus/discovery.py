@@ -46,7 +46,7 @@ class Process:
 
     @property
     def name(self) -> str:
-        """Its instance, or `?` and the beginning of its session's id where it has no name."""
+        """Return its instance, or `?` and the beginning of its session's id if it has no name."""
         return self.member.instance if self.member is not None else f"?{self.zid[:8]}"
 
 
@@ -80,7 +80,7 @@ class System:
         return [topic for topic in topics.ALL if any(self.doing(role, topic) for role in Role)]
 
     def unknown_topics(self) -> list[str]:
-        """Names in use that are no topic's: of another version."""
+        """Return the names in use that are no topic's: they are of another version."""
         known = {topic.name for topic in topics.ALL}
         return sorted({use.topic_name for use in self.uses} - known)
 

@@ -61,9 +61,8 @@ class Bus(Protocol):
     ) -> None:
         """Hand every message of `topic` to `deliver`.
 
-        `on_gap` is called with the topic's name and a number where messages are lost. Of a
-        NEVER_DROP topic, up to `history` earlier messages of each publisher that is still there
-        come first.
+        `on_gap` is called with the topic's name and a number if messages are lost. Of a NEVER_DROP
+        topic, up to `history` earlier messages of each publisher that is still there come first.
         """
 
     def serve(

@@ -139,7 +139,7 @@ def _config(mode: str, **settings: object) -> zenoh.Config:
 
 
 def _address(endpoint: str) -> tuple[str, int]:
-    """Host and port. Raises UsageError if `endpoint` is not one of TCP."""
+    """Return host and port. Raises UsageError if `endpoint` is not one of TCP."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
     is_port = port.isdecimal() and int(port) <= MAX_PORT

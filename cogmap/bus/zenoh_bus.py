@@ -55,7 +55,7 @@ class ZenohBus:
 
     @property
     def session(self) -> zenoh.Session:
-        """The session itself, for observers."""
+        """Return the session itself, for observers."""
         return self._session
 
     def declare(self, topic: Topic) -> None:
@@ -78,7 +78,7 @@ class ZenohBus:
         self._declared.append(announce_use(self._session, self._agent, role, topic))
 
     def _caching_publisher(self, key: str, topic: Topic) -> ext.AdvancedPublisher:
-        """A publisher from whose cache subscribers recover what a congested link dropped.
+        """Declare a publisher from whose cache subscribers recover what a congested link dropped.
 
         Blocking on such a link would stall every subscriber.
         """
@@ -214,7 +214,7 @@ def encoding(topic: Topic) -> zenoh.Encoding:
 
 
 def _priority(topic: Topic) -> zenoh.Priority:
-    """Images, health and the truth give way to what the cycle waits for."""
+    """Return a priority: images, health and the truth give way to what the cycle waits for."""
     is_large = topic.max_bytes > _LARGE_BYTES
     is_health = topic.scope is Scope.PROCESS
     can_be_replaced = topic.delivery is Delivery.LATEST_WINS
@@ -224,7 +224,7 @@ def _priority(topic: Topic) -> zenoh.Priority:
 
 
 def _envelope(sample: zenoh.Sample) -> Envelope | None:
-    """The envelope in a sample's attachment, None if there is none that can be decoded."""
+    """Decode the envelope in a sample's attachment; None if there is none that can be decoded."""
     if sample.attachment is None:
         return None
     try:

@@ -41,7 +41,7 @@ class Robot:
 
     @property
     def landmark_observations(self) -> Floats:
-        """The observations that are not of robots."""
+        """Return the observations that are not of robots."""
         subjects = self.observations[:, 1]
         is_landmark = subjects > ROBOTS[-1]
         return self.observations[is_landmark]
@@ -64,7 +64,7 @@ class _Columns(NamedTuple):
     positive: int | None = None
 
     def fit(self, rows: Floats) -> bool:
-        """Return if (n, columns) rows are such numbers."""
+        """Decide whether (n, columns) rows are such numbers."""
         if rows.shape[1] != self.number or not np.isfinite(rows).all():
             return False
         return self.positive is None or bool((rows[:, self.positive] > 0).all())

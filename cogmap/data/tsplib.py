@@ -67,7 +67,7 @@ class Problem:
 
     @cached_property
     def lengths(self) -> Floats:
-        """(n, n): between the positions, rounded to whole numbers as the type prescribes."""
+        """Return the positions' distances (n, n), rounded to whole numbers as the type asks."""
         return lengths(self.positions, self.weight_type)
 
 
@@ -238,7 +238,7 @@ def stem(path: Path) -> str:
 
 
 def lengths(positions: Floats, weight_type: str) -> Floats:
-    """(n, n): between (n, 2) positions, rounded as TSPLIB95 prescribes for the type."""
+    """Compute distances (n, n) of (n, 2) positions, rounded as TSPLIB95 prescribes for the type."""
     if weight_type == GEO:
         return great_circle_km(positions)
 
@@ -252,14 +252,14 @@ def lengths(positions: Floats, weight_type: str) -> Floats:
 
 
 def straight(positions: Floats) -> Floats:
-    """(n, n): straight distances between (n, 2) positions, not rounded."""
+    """Compute the straight distances (n, n) between (n, 2) positions, not rounded."""
     offsets = positions[:, None] - positions
     squared = np.square(offsets)
     return np.asarray(np.sqrt(squared.sum(axis=-1)))
 
 
 def great_circle_km(positions: Floats) -> Floats:
-    """(n, n): whole kilometres along great circles between latitudes and longitudes as DDD.MM."""
+    """Compute great-circle distances (n, n), in whole km, of latitudes and longitudes as DDD.MM."""
     degrees = np.trunc(positions)
     minutes = positions - degrees
     latitude, longitude = (_GEO_PI * (degrees + 5.0 * minutes / 3.0) / 180.0).T

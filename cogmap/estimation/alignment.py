@@ -14,10 +14,10 @@ def motion_onto(
     weights: Floats | None = None,
     unturned_information: float = 0.0,
 ) -> Floats:
-    """(3,): the pose that moves (k, 2) points onto others with the least squares (Umeyama 1991),
-    each counted by its weight (k,).
+    """Fit the pose (3,) that moves (k, 2) points onto others with the least squares (Umeyama 1991),
+    each point counted by its weight (k,).
 
-    `unturned_information`, in rad^-2, is that of a prior by which it does not turn.
+    `unturned_information`, in rad^-2, is the information of a prior that the points do not turn.
     """
     each = np.ones(len(points_m)) if weights is None else weights
     middle_m = each @ points_m / each.sum()

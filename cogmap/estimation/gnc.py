@@ -27,7 +27,7 @@ RELIABLE_SHARE = 0.5
 
 
 def inliers(graph: PoseGraph, false_closure: float) -> Booleans:
-    """(m,): which closures of `graph` are inliers, headings included."""
+    """Mark the closures of `graph` that are inliers, (m,), headings included."""
     if not len(graph.closures):
         return np.zeros(0, bool)
 
@@ -44,7 +44,7 @@ def inliers(graph: PoseGraph, false_closure: float) -> Booleans:
 
 
 def _by_weights(graph: PoseGraph, hypotheses: Hypotheses) -> Booleans:
-    """(m,): which closures keep their weight."""
+    """Mark the closures that keep their weight, (m,)."""
     weights = np.ones(len(graph.closures))
     convexity = 0.0
 

@@ -45,13 +45,13 @@ class Hypotheses:
 
     @property
     def shares(self) -> Floats:
-        """(m,): the weights by which each hypothesis counts once."""
+        """Return the weights (m,) by which each hypothesis counts once."""
         shares: Floats = 1 / self._support
         return shares
 
     def settled(self, accepted: Booleans) -> Booleans:
-        """(m,): which closures hold, from those `accepted` so far: none that all others contradict,
-        and all that agree with all others.
+        """Mark the closures that hold, (m,), given those `accepted` so far: none that all others
+        contradict, and all that agree with all others.
         """
         remaining, factor = self._without_contradicted(accepted)
         solver = IncrementalSolver(self._with(remaining))
@@ -68,8 +68,8 @@ class Hypotheses:
         return result
 
     def truncated_cost(self, accepted: Booleans) -> float:
-        """Return what truncated least squares makes least: the cost of the path by the accepted
-        closures, and the thresholds of all others, each hypothesis counted once.
+        """Return the cost that truncated least squares minimizes: that of the path by the accepted
+        closures, plus the thresholds of all other closures, with each hypothesis counted once.
         """
         closures = self._graph.closures.weighted(self.shares).select(accepted)
         graph = self._graph.with_closures(closures)
@@ -79,8 +79,8 @@ class Hypotheses:
         return path_cost + float(truncated.sum())
 
     def _without_contradicted(self, accepted: Booleans) -> tuple[Booleans, float]:
-        """(m,): which are left once no hypothesis is that all others contradict; and the variance
-        factor by those.
+        """Drop every hypothesis that all others contradict. Return which closures remain, (m,), and
+        the variance factor by those.
         """
         remaining = accepted
         factor = 1.0
@@ -109,16 +109,16 @@ class Hypotheses:
         return remaining, factor
 
     def _misfit(self, solver: IncrementalSolver, number: int) -> float:
-        """A closure's distance from what the solver's predict of it, over its threshold."""
+        """Return a closure's squared distance from what the solver predicts, over its threshold."""
         closure = self._graph.closures.select(np.array([number]))
         return solver.chi_square(closure) / float(self.threshold[number])
 
     def _variance_factor(self, solver: IncrementalSolver, accepted: Booleans) -> float:
-        """By how much the variances are less than stated, of a path by the accepted closures: 1
-        if they are not, or if there are too few hypotheses to know.
+        """Estimate by what factor the variances of a path by the accepted closures are less than
+        stated: 1 if they are not, or if there are too few hypotheses to know.
 
-        It is the greatest that the cost allows for, but with probability `false_closure`.
-        Closures of one hypothesis may err alike, and give one's degrees of freedom together.
+        It is the greatest factor that the cost allows for, except with probability `false_closure`.
+        Closures of one hypothesis may err alike: together they have the degrees of freedom of one.
         """
         closures = self._graph.closures.select(accepted)
         shares = 1 / _sizes(_alike(closures))
@@ -128,13 +128,13 @@ class Hypotheses:
         return min(1.0, (STATED_DEGREES + solver.cost) / least_cost)
 
     def _with(self, accepted: Booleans) -> PoseGraph:
-        """The path with the accepted closures alone."""
+        """Return the path with the accepted closures alone."""
         closures = self._graph.closures.select(accepted)
         return self._graph.with_closures(closures)
 
 
 def _degrees(closures: Constraints) -> Floats:
-    """(m,): the degrees of freedom of each closure, the rank of its information."""
+    """Count the degrees of freedom of each closure, (m,): the rank of its information."""
     eigenvalues = np.linalg.eigvalsh(closures.information)
     largest = eigenvalues[:, -1:]
     is_measured = eigenvalues > 1e-9 * largest
@@ -144,7 +144,7 @@ def _degrees(closures: Constraints) -> Floats:
 
 
 def _alike(closures: Constraints) -> list[list[int]]:
-    """(m,): which closures, itself among them, state the same as each."""
+    """List for each of m closures those that state the same, itself among them."""
     ends = np.column_stack([closures.i, closures.j]).astype(np.float64)
     tree = KDTree(ends)
 
@@ -160,8 +160,8 @@ def _sizes(groups: list[list[int]]) -> Floats:
 
 
 def _by_doubt(solver: IncrementalSolver, numbers: Indices) -> list[Indices]:
-    """The hypotheses among a solver's closures, whose `numbers` (k,) are given, the one first of
-    which all others predict the least, linearly.
+    """Sort the hypotheses among a solver's closures, whose `numbers` (k,) are given: first comes
+    the one that all others predict the least, linearly.
     """
     closures = solver.graph.closures
     hypotheses: list[Indices] = []

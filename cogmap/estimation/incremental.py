@@ -68,16 +68,16 @@ class IncrementalSolver:
 
     @property
     def cost(self) -> float:
-        """The cost of the path, after `add` as linear updates predict it."""
+        """Return the cost of the path: after `add`, as linear updates predict it."""
         return self._cost
 
     def chi_square(self, closure: Constraints) -> float:
-        """The squared Mahalanobis distance of one closure from what the others predict of it."""
+        """Return one closure's squared Mahalanobis distance from what the others predict of it."""
         return self._update(closure).chi_square
 
     def chi_square_without(self, closures: Constraints) -> float:
-        """The squared Mahalanobis distance of closures that are in, together, from what all others
-        predict of them.
+        """Return the squared Mahalanobis distance of closures that are already in, taken together,
+        from what all others predict of them.
         """
         roots = sqrt_information(closures.information)
         columns = []
@@ -131,7 +131,7 @@ class IncrementalSolver:
         )
 
     def _columns(self, closure: Constraints, root: Floats) -> tuple[Floats, Indices]:
-        """(u, 3): the closure's whitened Jacobian, transposed, and which of its rows are used."""
+        """Return the closure's whitened Jacobian, transposed, (u, 3), and which rows are used."""
         by_i, by_j = jacobians(self.graph.poses, closure)
 
         columns = np.zeros((self._normal.unknown_count, 3))
@@ -146,7 +146,7 @@ class IncrementalSolver:
         return columns, np.concatenate(used)
 
     def _solve(self, columns: Floats, used: Indices) -> Floats:
-        """(u, 3): the solution of the normal equations, all closures so far included."""
+        """Solve the normal equations for (u, 3) `columns`, with all closures so far included."""
         used_columns = columns[used]
         solved = self._factors.solve(columns)
         for update in self._update_columns:

@@ -57,7 +57,7 @@ class NormalEquations:
         self._sum_ends = _summing(ends[used], used, unknown_poses, len(ends))
 
     def matrix(self, poses: Floats, constraints: Constraints) -> sparse.csc_matrix:
-        """J' S^-1 J at `poses`."""
+        """Compute J' S^-1 J at `poses`."""
         by_i, by_j = jacobians(poses, constraints)
         weighted_i = by_i.mT @ constraints.information
         weighted_j = by_j.mT @ constraints.information
@@ -69,7 +69,7 @@ class NormalEquations:
         return self._pattern.summed(np.concatenate([at_i, across.mT, across, at_j]))
 
     def gradient(self, poses: Floats, constraints: Constraints) -> Floats:
-        """J' S^-1 d at `poses`, (3 (n - 1),)."""
+        """Compute J' S^-1 d at `poses`, (3 (n - 1),)."""
         residual = residuals(poses, constraints)
         weighted = matvec(constraints.information, residual)
 
@@ -84,7 +84,7 @@ class NormalEquations:
         return gradient
 
     def unknowns(self, pose: Indices) -> tuple[Indices, Booleans]:
-        """(k, 3): the unknowns of k poses, and (k,) which poses have any: the first has none."""
+        """Return the unknowns (k, 3) of k poses, and which have any, (k,): the first has none."""
         position = self._position[pose]
         is_free = position >= 0
 
@@ -92,7 +92,7 @@ class NormalEquations:
         return first + np.arange(3), is_free
 
     def moved(self, poses: Floats, step: Floats) -> Floats:
-        """`poses` after a step of the unknowns."""
+        """Return `poses` after a step of the unknowns."""
         result = poses.copy()
         result[self._order] += step.reshape(-1, 3)
         return result
@@ -121,8 +121,8 @@ class _BlockPattern:
         self._shape = (3 * unknown_poses, 3 * unknown_poses)
 
     def summed(self, blocks: Floats) -> sparse.csc_matrix:
-        """The matrix of (4 m, 3, 3) blocks, each transposed: columns are stored, and blocks by
-        rows.
+        """Sum (4 m, 3, 3) blocks into their matrix. Each is transposed: the matrix is stored by
+        columns, and blocks by rows.
         """
         summed = self._sum @ blocks.reshape(-1, 9)
         data = summed.reshape(-1, 3, 3)
@@ -135,7 +135,7 @@ class _BlockPattern:
 
 
 def _elimination_order(count: int, constraints: Constraints) -> Indices:
-    """The poses but the first, in an order of little fill (minimum degree)."""
+    """Order the poses but the first so that the factors have little fill (minimum degree)."""
     joined = adjacency(constraints.i, constraints.j, count)
     pattern = joined[1:, 1:]
     pattern.data[:] = 1.0
@@ -151,7 +151,7 @@ def _elimination_order(count: int, constraints: Constraints) -> Indices:
 
 
 def _summing(target: Indices, source: Indices, targets: int, sources: int) -> sparse.csr_matrix:
-    """A matrix that adds row `source[k]` of what it is multiplied with to row `target[k]`."""
+    """Make a matrix that adds row `source[k]` of what it is multiplied with to row `target[k]`."""
     ones = np.ones(len(target))
     shape = (targets, sources)
 
@@ -159,15 +159,15 @@ def _summing(target: Indices, source: Indices, targets: int, sources: int) -> sp
 
 
 def factor(matrix: sparse.csc_matrix) -> SuperLU:
-    """The factors of a positive definite matrix, in its own order."""
+    """Compute the factors of a positive definite matrix, in its own order."""
     return splu(matrix, **FACTORING)
 
 
 def optimize(graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> Floats:
-    """(n, 3): poses at a minimum of eq. 7, headings included, near those of `graph`. The first pose
-    stays.
+    """Find poses (n, 3) at a minimum of eq. 7, headings included, near those of `graph`. The first
+    pose stays.
 
-    After `max_iterations`, the best so far.
+    After `max_iterations`, return the best so far.
     """
     poses = graph.poses
     constraints = graph.constraints

@@ -33,7 +33,7 @@ class Points(NamedTuple):
 
     @property
     def range_m(self) -> Floats:
-        """(m,): how far the points are from their places."""
+        """Return how far the points are from their places, (m,)."""
         return _lengths(self.at_m)
 
 
@@ -54,21 +54,21 @@ class Views(NamedTuple):
 
     @property
     def has_heading(self) -> Booleans:
-        """(m,): whether the heading between the two places is known."""
+        """Return whether the heading between the two places is known, (m,)."""
         return self.sd_rad > 0
 
     @property
     def there(self) -> Points:
-        """The points that were seen, from the places before."""
+        """Return the points that were seen, from the earlier places."""
         return Points(self.i, self.there_m)
 
     @property
     def here(self) -> Points:
-        """The same points, from the later places."""
+        """Return the same points, from the later places."""
         return Points(self.j, self.here_m)
 
     def select(self, chosen: Booleans | Indices) -> Views:
-        """The chosen ones, by mask or indices."""
+        """Return the chosen views, by mask or indices."""
         return Views(
             i=self.i[chosen],
             j=self.j[chosen],
@@ -80,9 +80,9 @@ class Views(NamedTuple):
 
 
 def consistent(views: Views, steps: Constraints, false_closure: float) -> Booleans:
-    """(m,): which views are among MIN_AGREEING that all agree with one another.
+    """Mark the views that are among MIN_AGREEING that all agree with one another, (m,).
 
-    `steps` are those of the path; views that agree are taken for disagreeing with probability
+    `steps` are those of the path. Views that agree are taken for disagreeing with probability
     `false_closure`.
     """
     # Each view is compared with those that follow it along the path.
@@ -116,7 +116,7 @@ class _DeadReckoning:
         self._variance_rad2 = cumulative(steps.variance_rad2)
 
     def between_m(self, one: Points, other: Points) -> Floats:
-        """(m,): the distance between the points of either."""
+        """Measure the distance between each point of `one` and that of `other`, (m,)."""
         pose = self.poses[one.place]
         other_pose = self.poses[other.place]
 
@@ -125,7 +125,7 @@ class _DeadReckoning:
         return _lengths(point_m - other_point_m)
 
     def variance_m2(self, one: Points, other: Points) -> Floats:
-        """(m,): the variance of `between_m`: of the steps, and of the turns at their lever arm."""
+        """Return the variance of `between_m`, (m,): of steps, and of turns at their lever arm."""
         length_m = _between(self._length_m, one.place, other.place)
         lever_arm_m = np.maximum(one.range_m, other.range_m)
         lever_m2 = length_m**2 / 3 + lever_arm_m**2
@@ -137,31 +137,31 @@ class _DeadReckoning:
         return variance_m2
 
     def turn_rad(self, one: Indices, other: Indices) -> Floats:
-        """(m,): the heading at one place less that at another."""
+        """Return the heading at one place less that at another, (m,)."""
         headings_rad = self.poses[:, 2]
 
         turn_rad: Floats = headings_rad[one] - headings_rad[other]
         return turn_rad
 
     def variance_rad2(self, one: Indices, other: Indices) -> Floats:
-        """(m,): the variance of `turn_rad`."""
+        """Return the variance of `turn_rad`, (m,)."""
         return _between(self._variance_rad2, one, other)
 
 
 def _between(summed: Floats, one: Indices, other: Indices) -> Floats:
-    """(m,): how much a running sum changes between two places each, in either direction."""
+    """Return how much a running sum changes between two places each, (m,), in either direction."""
     change = summed[one] - summed[other]
     return np.asarray(np.abs(change))
 
 
 def _lengths(vectors: Floats) -> Floats:
-    """(m,): the lengths of (m, 2) vectors."""
+    """Compute the lengths (m,) of (m, 2) vectors."""
     x, y = vectors.T
     return np.asarray(np.hypot(x, y))
 
 
 def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float) -> Booleans:
-    """(m,): which pairs of views agree."""
+    """Mark the pairs of views that agree, (m,)."""
     there_m2 = path.variance_m2(one.there, other.there)
     here_m2 = path.variance_m2(one.here, other.here)
     path_m2 = there_m2 + here_m2

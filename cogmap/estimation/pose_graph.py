@@ -32,18 +32,18 @@ class Constraints:
 
     @property
     def variance_m2(self) -> Floats:
-        """(m,): the variance of the positions, if it is the same by either axis."""
+        """Return the variance of the positions, (m,), if it is the same by either axis."""
         variance_m2: Floats = 1 / self.information[:, 0, 0]
         return variance_m2
 
     @property
     def variance_rad2(self) -> Floats:
-        """(m,): the variance of the headings, if they are measured by themselves."""
+        """Return the variance of the headings, (m,), if they are measured by themselves."""
         variance_rad2: Floats = 1 / self.information[:, 2, 2]
         return variance_rad2
 
     def select(self, chosen: Booleans | Indices | slice) -> Constraints:
-        """The chosen ones, by mask, indices or slice."""
+        """Return the chosen constraints, by mask, indices or slice."""
         return Constraints(
             i=self.i[chosen],
             j=self.j[chosen],
@@ -52,7 +52,7 @@ class Constraints:
         )
 
     def weighted(self, weights: Floats) -> Constraints:
-        """The same with their information multiplied by (m,) weights."""
+        """Return the same constraints with their information multiplied by (m,) weights."""
         weighted = self.information * weights[:, None, None]
         return replace(self, information=weighted)
 
@@ -109,17 +109,17 @@ class PoseGraph:
         )
 
     def with_closures(self, closures: Constraints) -> PoseGraph:
-        """The same path with other closures."""
+        """Return the same path with other closures."""
         return replace(self, closures=closures)
 
     @property
     def constraints(self) -> Constraints:
-        """All constraints, the steps first."""
+        """Return all constraints, the steps first."""
         return self.steps + self.joins + self.closures
 
 
 def diagonal_information(position: Floats, heading: Floats) -> Floats:
-    """(m, 3, 3): the information of positions, (m,) by either axis, and of headings, (m,)."""
+    """Return the information (m, 3, 3) of positions, (m,) by either axis, and of headings, (m,)."""
     information = np.zeros((len(position), 3, 3))
     information[:, 0, 0] = position
     information[:, 1, 1] = position
@@ -128,7 +128,7 @@ def diagonal_information(position: Floats, heading: Floats) -> Floats:
 
 
 def adjacency(one: Indices, other: Indices, count: int) -> sparse.csc_matrix:
-    """(count, count): by how many of (m,) pairs of numbers each two are joined, both directions."""
+    """Count by how many of (m,) pairs two numbers are joined, both directions: (count, count)."""
     rows = np.concatenate([one, other])
     columns = np.concatenate([other, one])
 
@@ -137,8 +137,8 @@ def adjacency(one: Indices, other: Indices, count: int) -> sparse.csc_matrix:
 
 
 def residuals(poses: Floats, constraints: Constraints) -> Floats:
-    """(m, 3): what the poses make of each constraint less what it measures, in the frame of pose
-    i.
+    """Compute what the poses make of each constraint less what it measures, (m, 3), in the frame of
+    pose i.
     """
     origins = poses[constraints.i]
     ends = poses[constraints.j]
@@ -149,26 +149,26 @@ def residuals(poses: Floats, constraints: Constraints) -> Floats:
 
 
 def matvec(matrices: Floats, vectors: Floats) -> Floats:
-    """(m, a): each of (m, a, b) matrices times its vector of (m, b)."""
+    """Multiply each of (m, a, b) matrices by its vector of (m, b): (m, a)."""
     product: Floats = np.einsum("mab,mb->ma", matrices, vectors)
     return product
 
 
 def mahalanobis2(residual: Floats, information: Floats) -> Floats:
-    """(m,): the terms d' S^-1 d of eq. 7, for (m, 3) residuals."""
+    """Compute the terms d' S^-1 d of eq. 7, (m,), for (m, 3) residuals."""
     squared: Floats = np.einsum("ma,mab,mb->m", residual, information, residual)
     return squared
 
 
 def cost(poses: Floats, constraints: Constraints) -> float:
-    """Eq. 7, headings included."""
+    """Compute eq. 7, headings included."""
     residual = residuals(poses, constraints)
     terms = mahalanobis2(residual, constraints.information)
     return float(terms.sum())
 
 
 def jacobians(poses: Floats, constraints: Constraints) -> tuple[Floats, Floats]:
-    """(m, 3, 3) each: the derivative of each residual by pose i, and by pose j."""
+    """Compute the derivative of each residual by pose i, and by pose j, (m, 3, 3) each."""
     origins = poses[constraints.i]
     ends = poses[constraints.j]
     predicted = relative(origins, ends)
@@ -184,7 +184,7 @@ def jacobians(poses: Floats, constraints: Constraints) -> tuple[Floats, Floats]:
 
 
 def sqrt_information(information: Floats) -> Floats:
-    """(m, 3, 3) matrices R with R R' = `information`, which may be singular."""
+    """Return (m, 3, 3) matrices R with R R' = `information`, which may be singular."""
     values, vectors = np.linalg.eigh(information)
     scales = np.sqrt(values.clip(0.0))
 

@@ -72,7 +72,7 @@ def displacements(poses: Floats, constraints: Constraints) -> Displacements:
 
 
 def position_cost(positions_m: Floats, constraints: Constraints, known: Displacements) -> float:
-    """Eq. 7 for (n, 2) positions."""
+    """Compute eq. 7 for (n, 2) positions."""
     origin_m = positions_m[constraints.i]
     offset_m = positions_m[constraints.j] - origin_m
 
@@ -104,13 +104,13 @@ class Loops:
 
     @property
     def discrepancy_m(self) -> Floats:
-        """(m, 2): d_i of every loop, after path integration alone."""
+        """Return d_i of every loop, (m, 2), after path integration alone."""
         integrated_m = self._across(self._integrated_m)
         return self._closing_m - integrated_m
 
     def shifts(self, forces: Floats) -> Floats:
-        """One reverse replay: (n, 2) shifts of the positions under (m, 2) forces (eq. 9's alpha A d
-        p, summed up).
+        """Replay once in reverse: return (n, 2) shifts of the positions under (m, 2) forces (eq.
+        9's alpha A d p, summed up).
         """
         entering = self._summed(self._end, forces)
         leaving = self._summed(self._start, forces)
@@ -121,18 +121,18 @@ class Loops:
         return cumulative(stretched_m)
 
     def yielded(self, forces: Floats) -> Floats:
-        """(m, 2): how far `forces` close each loop: the path yields, and so does the closure."""
+        """Compute how far `forces` close each loop, (m, 2): path and closure both yield."""
         by_path_m = self._across(self.shifts(forces))
         by_closure_m = matvec(self._closing_m2, forces)
         return by_path_m + by_closure_m
 
     def positions_m(self, forces: Floats) -> Floats:
-        """(n, 2): the path under `forces`."""
+        """Return the path under `forces`, (n, 2)."""
         shifts_m = self.shifts(forces)
         return self._integrated_m + shifts_m
 
     def costs(self, forces: Floats) -> tuple[float, float]:
-        """Eq. 7 of the path under `forces`, and a lower bound for any forces (its dual)."""
+        """Compute eq. 7 of the path under `forces`, and a lower bound for any forces (its dual)."""
         yielded_m = self.yielded(forces)
         by_closure_m = matvec(self._closing_m2, forces)
         work = _dot(forces, yielded_m)
@@ -147,12 +147,12 @@ class Loops:
         return in_steps + in_closures, bound
 
     def _across(self, along: Floats) -> Floats:
-        """The change of (n, ...) values along the path from each loop's start to its end."""
+        """Return the change of (n, ...) values along the path from each loop's start to its end."""
         change: Floats = along[self._end] - along[self._start]
         return change
 
     def _summed(self, places: Indices, forces: Floats) -> Floats:
-        """(n, 2): the forces that act at each place."""
+        """Sum the forces that act at each place, (n, 2)."""
         count = len(self._integrated_m)
 
         x = np.bincount(places, forces[:, 0], count)
@@ -187,17 +187,17 @@ def close_loops(graph: PoseGraph, tolerance: float = 0.01, max_replays: int = 50
 
 
 def with_positions_only(graph: PoseGraph) -> PoseGraph:
-    """The path of which headings are not corrected: the positions take up their errors.
+    """Return the path whose headings are not corrected: the positions take up their errors.
 
-    A turn of variance h somewhere on a loop of length L moves its end by a variance of h L^2 / 3 on
-    the mean. Where a landmark is seen from, the headings of all the loop turn.
+    On average, a turn of variance h somewhere on a loop of length L moves its end by a variance of
+    h L^2 / 3. Views of landmarks turn with the headings of their whole loop.
     """
     loops = graph.closures + graph.joins
     if not len(loops):
         return graph
 
     def between_ends(values: Floats) -> Floats:
-        """(m,): the sum of (n,) values of the steps between the ends of each loop."""
+        """Sum the (n,) values of the steps between the ends of each loop, (m,)."""
         summed = cumulative(values)
         return np.asarray(np.abs(summed[loops.j] - summed[loops.i]))
 
@@ -256,7 +256,7 @@ def _inverse(matrices: Floats) -> Floats:
 
 
 def _weighted_squares(errors_m: Floats, covariance_m2: Floats) -> float:
-    """The sum of d' S^-1 d over (m, 2) errors."""
+    """Sum d' S^-1 d over (m, 2) errors."""
     solved = np.linalg.solve(covariance_m2, errors_m[..., None])
     squares = errors_m * solved[..., 0]
     return float(np.sum(squares))

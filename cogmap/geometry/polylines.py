@@ -20,7 +20,7 @@ class Nearest(NamedTuple):
 
 
 def distances_along(points_m: Floats) -> Floats:
-    """(n,): how far along a polyline each of its points is, in metres."""
+    """Measure how far along a polyline each of its points is, (n,), in metres."""
     if not len(points_m):
         return np.zeros(0)
 
@@ -29,13 +29,13 @@ def distances_along(points_m: Floats) -> Floats:
 
 
 def points_at(points_m: Floats, along_m: Floats) -> Floats:
-    """(k, 2): the points of a polyline at distances along it; beyond its ends, the ends."""
+    """Return the points (k, 2) of a polyline at distances along it; beyond its ends, the ends."""
     known_m = distances_along(points_m)
     return interpolate(known_m, points_m, along_m)
 
 
 def interpolate(known: Floats, values: Floats, at: Floats) -> Floats:
-    """(k, d): each column of (n, d) `values`, known at increasing `known` (n,), at `at` (k,)."""
+    """Interpolate (n, d) `values`, known at increasing `known` (n,), at `at` (k,): (k, d)."""
     columns = [np.interp(at, known, column) for column in values.T]
     return np.column_stack(columns)
 

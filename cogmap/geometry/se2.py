@@ -22,8 +22,8 @@ def wrap_angle(angle_rad: Floats) -> Floats:
 
 
 def rotation_matrices(heading_rad: Floats) -> Floats:
-    """(..., 2, 2) matrices that rotate by angles of any shape (...): from a robot's axes to the
-    world's.
+    """Return (..., 2, 2) matrices that rotate by angles of any shape (...): from a robot's axes to
+    the world's.
     """
     cos = np.cos(heading_rad)
     sin = np.sin(heading_rad)
@@ -32,7 +32,7 @@ def rotation_matrices(heading_rad: Floats) -> Floats:
 
 
 def rotate(vectors: Floats, angle_rad: Floats | float) -> Floats:
-    """(..., 2) vectors rotated counter-clockwise, all by one angle or each by its own (...)."""
+    """Rotate (..., 2) vectors counter-clockwise, all by one angle or each by its own (...)."""
     cos = np.cos(angle_rad)
     sin = np.sin(angle_rad)
     x = vectors[..., 0]
@@ -44,14 +44,14 @@ def rotate(vectors: Floats, angle_rad: Floats | float) -> Floats:
 
 
 def transform_from(pose: Floats, points_m: Floats) -> Floats:
-    """(..., 2) points of the frame of `pose`, in the frame that `pose` is given in."""
+    """Transform (..., 2) points from the frame of `pose` to the frame that `pose` is given in."""
     rotated_m = rotate(points_m, pose[..., 2])
     placed: Floats = pose[..., :2] + rotated_m
     return placed
 
 
 def transform_to(pose: Floats, points_m: Floats) -> Floats:
-    """(..., 2) points of the frame that `pose` is given in, in the frame of `pose`."""
+    """Transform (..., 2) points from the frame that `pose` is given in to the frame of `pose`."""
     offset_m = points_m - pose[..., :2]
     return rotate(offset_m, -pose[..., 2])
 
@@ -76,7 +76,7 @@ def _pose(position_m: Floats, heading_rad: Floats) -> Floats:
 
 
 def move_with(points_m: Floats, before: Floats, after: Floats) -> Floats:
-    """(..., 2) points that stand to the poses `after` as they stood to the poses `before`."""
+    """Move (..., 2) points: they stand to the poses `after` as they stood to the poses `before`."""
     turned_rad = after[..., 2] - before[..., 2]
     offset_m = points_m - before[..., :2]
     moved: Floats = after[..., :2] + rotate(offset_m, turned_rad)
@@ -84,8 +84,8 @@ def move_with(points_m: Floats, before: Floats, after: Floats) -> Floats:
 
 
 def integrate(start: Floats, steps: Floats) -> Floats:
-    """(n + 1, 3): the poses that (n, 3) steps lead through from `start`, each step in the frame of
-    the pose before it. Headings are not wrapped, so that turns can be counted.
+    """Return the (n + 1, 3) poses that (n, 3) steps lead through from `start`, each step in the
+    frame of the pose before it. Headings are not wrapped, so that turns can be counted.
     """
     headings_rad = start[2] + cumulative(steps[:, 2])
     moved_m = rotate(steps[:, :2], headings_rad[:-1])
@@ -94,8 +94,8 @@ def integrate(start: Floats, steps: Floats) -> Floats:
 
 
 def moved_by(pose: Floats, motions: Floats) -> Floats:
-    """(3,): the pose that a self-motion leads to from `pose`, of (n, 3 or more) rows that begin
-    with speed in m/s, turn rate in rad/s and duration in s.
+    """Return the pose (3,) that a self-motion leads to from `pose`. The motion has (n, 3 or more)
+    rows that begin with speed in m/s, turn rate in rad/s and duration in s.
     """
     speed, turn_rate, duration_s = motions[:, :3].T
     steps = np.column_stack([speed * duration_s, np.zeros(len(motions)), turn_rate * duration_s])
@@ -104,7 +104,7 @@ def moved_by(pose: Floats, motions: Floats) -> Floats:
 
 
 def mean_pose(poses: Floats) -> Floats:
-    """(3,): the mean of n poses, of the headings the mean direction. Columns after those of the
+    """Average n poses: (3,), with the mean direction of the headings. Columns after those of the
     pose are ignored, (n, 3 or more).
     """
     # A product with weights takes a fraction of the time of mean().
@@ -119,7 +119,7 @@ def mean_pose(poses: Floats) -> Floats:
 
 
 def cumulative(values: Floats) -> Floats:
-    """(n + 1, ...): sums of the first 0, 1, ... n of (n, ...) values."""
+    """Sum the first 0, 1, ... n of (n, ...) values: (n + 1, ...)."""
     zero = np.zeros((1, *values.shape[1:]))
     sums = np.cumsum(values, axis=0)
     return np.concatenate([zero, sums])

@@ -55,7 +55,7 @@ def crossings(starts: Floats, ends: Floats) -> Crossings:
 
 
 def _on_axes(points: Floats) -> tuple[Floats, Floats]:
-    """u and v of (n, 2) points for each direction, (4 n,) each."""
+    """Return u and v of (n, 2) points for each direction, (4 n,) each."""
     u = AXIS_U @ points.T
     v = AXIS_V @ points.T
     return u.reshape(-1), v.reshape(-1)

@@ -23,8 +23,8 @@ def activation(node: GraphNode, cycle: int, decay: Decay) -> float:
 
 
 def base_level(node: GraphNode, cycle: int, decay: Decay) -> float:
-    """Return a node's base-level activation in `cycle`. One that has reached what is kept decays no
-    further than to that.
+    """Return a node's base-level activation in `cycle`. Once it has reached the level that is kept,
+    it never decays below that.
     """
     if KINDS[type(node)].persistent:
         return node.base_level
@@ -36,7 +36,7 @@ def base_level(node: GraphNode, cycle: int, decay: Decay) -> float:
 
 
 def total_activation(node: GraphNode, cycle: int, decay: Decay) -> float:
-    """min(1, base-level + current), LIDA's total activation, in `cycle`."""
+    """Return min(1, base-level + current), LIDA's total activation, in `cycle`."""
     current = activation(node, cycle, decay)
     base = base_level(node, cycle, decay)
     return min(1.0, current + base)

@@ -105,7 +105,7 @@ class Graph:
 
     @property
     def agent(self) -> Self | None:
-        """The self node; None before the first cycle."""
+        """Return the self node; None before the first cycle."""
         node = self.nodes.get(SELF_ID)
         return node if isinstance(node, Self) else None
 
@@ -115,9 +115,7 @@ class Graph:
         return node if isinstance(node, kind) else None
 
     def of_kind(self, kind: type[K]) -> Iterator[K]:
-        """Return all nodes of a kind, by id. Of a kind that is not indexed it searches
-        every node.
-        """
+        """Yield all nodes of a kind, by id. If the kind is not indexed, it searches every node."""
         names = self._by_kind.get(kind, self.nodes)
 
         for name in sorted(names):
@@ -131,12 +129,12 @@ class Graph:
 
     @property
     def path(self) -> list[PathSegment]:
-        """The segments of the path, the oldest first."""
+        """Return the segments of the path, the oldest first."""
         return sorted(self.of_kind(PathSegment), key=attrgetter("number"))
 
     @property
     def last_segment(self) -> PathSegment | None:
-        """The newest segment of the path."""
+        """Return the newest segment of the path; None if there is none."""
         return max(self.of_kind(PathSegment), key=attrgetter("number"), default=None)
 
     def cell_m(self, map_id: str = ROOT_MAP) -> float:
@@ -208,7 +206,7 @@ class Graph:
         return hashlib.blake2b(content, digest_size=16).hexdigest()
 
     def _name_of(self, identifier: str) -> str:
-        """The string by which a node is known already; that one itself where there is no node."""
+        """Return the string that already names a node; `identifier` itself if there is no node."""
         node = self.nodes.get(identifier)
         return identifier if node is None else node.id
 
@@ -237,4 +235,4 @@ class Graph:
 
 
 def _leave_out(operation: Operation) -> None:
-    """The applier of what a graph does not hold."""
+    """Leave out an operation on what a graph does not hold."""

@@ -118,7 +118,7 @@ class LinkIndex:
         return sorted({*self._targets, *self._target})
 
     def in_bulk(self) -> Iterator[Links]:
-        """Return all links by kind, in an order that depends on the content alone."""
+        """Yield all links by kind, in an order that depends on the content alone."""
         for kind in self.kinds():
             if kind in EXCLUSIVE_LINKS:
                 pairs = sorted(self._target[kind].items())
@@ -150,7 +150,7 @@ class LinkIndex:
         self._target[kind][source] = pair
 
     def _put_all_exclusive(self, links: Links) -> None:
-        """Set many links, and the sources of each target once: one by one, a map with a hundred
+        """Set many links, and the sources of each target once. One by one, a map with a hundred
         thousand objects would have them copied as often.
         """
         kind = links.kind
@@ -184,7 +184,7 @@ class LinkIndex:
             self._sources[kind][target] = (*known, *new)
 
     def _pair(self, kind: str, target: str, weight: float) -> tuple[str, float]:
-        """A target and a weight: those of another link where they are the same."""
+        """Return a target and a weight: the pair of another link if that is the same."""
         sources = self._sources[kind].get(target, ())
         if sources:
             pair = self._target[kind][sources[0]]

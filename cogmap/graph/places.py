@@ -122,7 +122,7 @@ class PlaceGrid:
         self.tiles[message.map, message.x, message.y] = tile
 
     def messages(self) -> Iterator[PlaceTile]:
-        """Return all tiles, in order of map and position."""
+        """Yield all tiles, in order of map and position."""
         for key in sorted(self.tiles):
             yield self.message(key)
 
@@ -146,7 +146,7 @@ class PlaceGrid:
         )
 
     def of_map(self, map_id: str) -> Iterator[tuple[TileKey, Tile]]:
-        """Return the tiles of one map, in order of position."""
+        """Yield the tiles of one map, in order of position."""
         for key in sorted(self.tiles):
             if key[0] == map_id:
                 yield key, self.tiles[key]
@@ -243,7 +243,7 @@ class PlaceGrid:
         )
 
     def links(self, map_id: str, i: int, j: int) -> Iterator[Link]:
-        """Return the links from a place node to those of its eight neighbours that exist, by
+        """Yield the links from a place node to those of its eight neighbours that exist, by
         direction.
         """
         here = place_id(i, j, map_id)

@@ -69,8 +69,8 @@ class Replica:
     def follow(self, delta: Delta, incarnation: int | None = None) -> bool:
         """Apply `delta`, published by that incarnation of the workspace.
 
-        Returns true if the graph holds it: false if a snapshot is needed and none was to be had,
-        or where the delta is of an incarnation that has ended.
+        Returns true if the graph holds it: false if a snapshot is needed and none was to be had, or
+        if the delta is of an incarnation that has ended.
         """
         if incarnation in self._ended:
             return False
@@ -126,9 +126,9 @@ class Replica:
 
 
 def snapshot_over(bus: Bus, timeout_s: float = SNAPSHOT_TIMEOUT_S) -> Fetch:
-    """Returns a function that asks the workspace on `bus` for its graph.
+    """Return a function that asks the workspace on `bus` for its graph.
 
-    That function raises NoAnswerError where there is no answer, or one that is not a snapshot.
+    That function raises NoAnswerError if there is no answer, or one that is not a snapshot.
     """
 
     def fetch(request: SnapshotRequest) -> Fetched:

@@ -27,7 +27,7 @@ def tiles_of(cells: Indices) -> list[tuple[int, int]]:
 
 
 def by_tile(cells: Indices) -> Iterator[tuple[tuple[int, int], Indices | slice]]:
-    """Each tile (x, y) that (n, 2) cells lie in, and which of the cells those are, in order."""
+    """Yield each tile (x, y) that (n, 2) cells lie in, and which cells those are, in order."""
     if not len(cells):
         return
 
@@ -45,7 +45,7 @@ def by_tile(cells: Indices) -> Iterator[tuple[tuple[int, int], Indices | slice]]
 
 
 def _tile_keys(cells: Indices) -> Indices:
-    """(n,): a number for the tile of each of (n, 2) cells, in order of tiles."""
+    """Number the tile of each of (n, 2) cells, (n,), in order of tiles."""
     tiles = cells.astype(np.int64, copy=False) // TILE_SIDE
     keys: Indices = tiles[:, 0] * _KEY_STEP + tiles[:, 1]
     return keys
@@ -57,13 +57,13 @@ def _are_same(keys: Indices) -> bool:
 
 
 def _tile(key: int) -> tuple[int, int]:
-    """The tile (x, y) of a number of `_tile_keys`."""
+    """Return the tile (x, y) of a number of `_tile_keys`."""
     x, from_lowest = divmod(key + _KEY_STEP // 2, _KEY_STEP)
     return x, from_lowest - _KEY_STEP // 2
 
 
 def positions_in(extent: Extent) -> Iterator[tuple[int, int]]:
-    """Return the tiles (x, y) that have cells in `extent`, whether they exist or not."""
+    """Yield the tiles (x, y) that have cells in `extent`, whether they exist or not."""
     if not all(extent.shape):
         return
 

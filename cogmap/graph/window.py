@@ -43,7 +43,7 @@ class Extent:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """How many cells it has in each direction."""
+        """Return how many cells it has in each direction."""
         width = max(0, self.upper[0] - self.lower[0])
         height = max(0, self.upper[1] - self.lower[1])
         return width, height
@@ -68,7 +68,7 @@ class Window:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """How many cells it has in each direction."""
+        """Return how many cells it has in each direction."""
         _, width, height = self.values.shape
         return width, height
 

@@ -54,8 +54,8 @@ def diff(
     chosen: Collection[Topic] | None = None,
     progress: Progress | None = None,
 ) -> Diff:
-    """Compare the messages on `chosen`, every MODEL topic where it is None, by source, incarnation
-    and number.
+    """Compare the messages on `chosen`, every MODEL topic if it is None, by source, incarnation and
+    number.
 
     Raises LogError if one is no log, or damaged.
     """

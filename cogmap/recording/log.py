@@ -48,32 +48,32 @@ class Log:
 
     @property
     def path(self) -> Path:
-        """The file."""
+        """Return the path of the file."""
         return self._reader.path
 
     @property
     def duration_s(self) -> float:
-        """Seconds from the first message to the last."""
+        """Return the seconds from the first message to the last."""
         return self._reader.span_s
 
     @property
     def software(self) -> str:
-        """The program that recorded it, such as `cogmap 0.2.0`."""
+        """Return the program that recorded it, such as `cogmap 0.2.0`."""
         return self._about().get("software", "")
 
     @property
     def agent(self) -> str:
-        """Whose topics these are."""
+        """Return the agent whose topics these are."""
         return self._about().get("agent", "")
 
     @property
     def config(self) -> dict[str, dict[str, Any]]:
-        """The configuration that it was recorded with, by module and key. Raises LogError."""
+        """Return the configuration of the recording, by module and key. Raises LogError."""
         return recorded_config(self._reader)
 
     @property
     def topics(self) -> list[str]:
-        """The topics that it has a channel for, in the order of the table; some may be empty."""
+        """Return the topics that it has a channel for, in the table's order; some may be empty."""
         channels = self._reader.channels.values()
         recorded = {channel.topic for channel in channels}
 
@@ -102,8 +102,8 @@ class Log:
     def last(self, topic: str, holds: Callable[[Any], bool]) -> Entry | None:
         """Return the last message on `topic` for which `holds` is true; None if it is for none.
 
-        What is true for a message must be true for those before it, as that it is of a cycle or
-        before. It is found by bisection: little of a long log is read. Raises as `messages` does.
+        If `holds` is true for a message, it must be for all before, as "of cycle 9 or before" is.
+        Bisection finds it: little of a long log is read. Raises as `messages` does.
         """
         found = None
         begin_s = 0.0

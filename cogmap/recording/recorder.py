@@ -79,7 +79,7 @@ class Recorder:
 
     @property
     def path(self) -> Path:
-        """The file that it writes."""
+        """Return the file that it writes."""
         return self._writer.path
 
     @property
@@ -160,7 +160,7 @@ class Recorder:
         self._queue.call(note)
 
     def _take(self, timeout_s: float) -> bool:
-        """Write or do what has waited longest; return if there was anything."""
+        """Write or do what has waited longest. Return whether there was anything."""
         item = self._queue.take(timeout_s)
         if item is None:
             return False

@@ -126,7 +126,7 @@ def percepts(reader: LogReader, frame: CameraFrame) -> Percepts | None:
 
 
 def image(array: Array, name: str) -> Image:
-    """RGB, (h, w, 3). Raises LogError, naming the image by `name`, where it is something else."""
+    """Return RGB, (h, w, 3). Raises LogError, naming it by `name`, if it is something else."""
     shape = array.shape
     is_rgb = array.dtype == "|u1" and len(shape) == 3 and shape[2] == 3
     if not is_rgb or 0 in shape:
@@ -137,7 +137,7 @@ def image(array: Array, name: str) -> Image:
 
 
 def depth(array: Array, name: str) -> Depth:
-    """Metres, (h, w), 0 unknown. Raises LogError, naming it by `name`, for something else."""
+    """Return metres, (h, w), 0 unknown. Raises LogError, naming it by `name`, if it is no depth."""
     if array.dtype != "<f4" or len(array.shape) != 2 or 0 in array.shape:
         raise LogError(
             f"{name}: expected a float32 depth image (height, width), "

@@ -37,7 +37,7 @@ class CycleContext:
 
     @property
     def stamp_ns(self) -> int:
-        """The time of the view."""
+        """Return the time of the view."""
         return self.percepts.stamp_ns
 
     def task(
@@ -55,8 +55,8 @@ class CycleContext:
     ) -> Task:
         """Return a task for `codelet` about nodes `about`, by id.
 
-        `subject` distinguishes the tasks of one codelet in one cycle. It carries what was sensed as
-        far as it is asked for: `with_boundary` is where the road ends.
+        `subject` distinguishes the tasks of one codelet in one cycle. The task carries what was
+        sensed if it is asked for: `with_boundary` asks for where the road ends.
         """
         task_id = f"{self.cycle}/{codelet}"
         if subject:
@@ -135,7 +135,7 @@ class ConfiguredCodelet:
 
     @property
     def name(self) -> str:
-        """The codelet's name."""
+        """Return the codelet's name."""
         return self.codelet.name
 
     def due(self, context: CycleContext, graph: Graph) -> list[Task]:

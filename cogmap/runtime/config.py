@@ -65,7 +65,7 @@ def _keys_of(name: str, section: Any) -> dict[str, Any]:
 
 
 def typed(sections: Sections, name: str, kind: type[C]) -> C:
-    """Section `name` as a `kind`, its defaults filled in.
+    """Convert section `name` to a `kind`, its defaults filled in.
 
     Raises ConfigError that names the key or the value, also if a number is not finite.
     """
@@ -83,8 +83,8 @@ def typed(sections: Sections, name: str, kind: type[C]) -> C:
 
 
 def recorded(sections: Sections, name: str, kind: type[C]) -> C:
-    """Section `name` of a log as a `kind`, without the keys that another version had. Raises
-    ConfigError as `typed` does.
+    """Convert section `name` of a log to a `kind`, without the keys that another version had.
+    Raises ConfigError as `typed` does.
     """
     fields = {field.encode_name for field in msgspec.structs.fields(kind)}
     section = sections.get(name, {})
@@ -104,6 +104,6 @@ def _check_finite(path: str, value: Any) -> None:
 
 
 def _nearest(word: str, words: list[str]) -> str:
-    """The end of a sentence about an unknown `word`: what was meant, or what there is."""
+    """Return the end of a sentence about an unknown `word`: what was meant, or what there is."""
     hint = did_you_mean(word, words, f"it has {', '.join(words) or 'none'}")
     return f": {hint}"

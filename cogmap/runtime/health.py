@@ -17,7 +17,7 @@ _RECENT = 512
 
 
 def memory_mb() -> float:
-    """This process's resident memory, in 10^6 bytes."""
+    """Return this process's resident memory, in 10^6 bytes."""
     return psutil.Process().memory_info().rss / 1e6
 
 
@@ -72,7 +72,7 @@ class Meter:
         )
 
     def _compute_ms(self, quantile: float) -> float:
-        """A quantile of the time that recent messages took."""
+        """Return a quantile of the time that recent messages took."""
         if not self._compute_ns:
             return 0.0
         ordered = sorted(self._compute_ns)

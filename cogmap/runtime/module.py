@@ -124,7 +124,7 @@ class Module:
         return self
 
     def remembering(self, restore: Handler) -> Module:
-        """Keep what it publishes on memory/stored in a database that outlives the run, where it has
+        """Keep what it publishes on memory/stored in a database that outlives the run, if there is
         one: on the disk before it is published. `restore` receives all of that at the start.
         """
         self.remembers = True
@@ -135,7 +135,7 @@ class Module:
         return list(self.answers(message))
 
     def answers(self, message: Message) -> Iterator[Message]:
-        """Do as `feed` does, returning each message as soon as it is known."""
+        """Do as `feed` does, but yield each message as soon as it is known."""
         if self.graph is not None and isinstance(message, Delta):
             self.graph.apply(message)
 
@@ -149,7 +149,7 @@ class Module:
         return [] if self.on_load is None else self.stamp(self.on_load())
 
     def stamp(self, reply: Reply) -> list[Message]:
-        """Copies of what a handler returned, with this instance's name and the next numbers.
+        """Copy what a handler returned, with this instance's name and the next numbers.
 
         Raises CogmapError for a message of a topic that the module does not declare.
         """
@@ -176,4 +176,4 @@ def _as_list(reply: Reply) -> list[Message]:
 
 
 def _ignore(message: Message) -> None:
-    """The handler of a topic that only the shell uses."""
+    """Do nothing: only the shell uses the topic."""

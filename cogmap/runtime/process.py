@@ -42,7 +42,7 @@ class Stop:
 
     @property
     def asked(self) -> bool:
-        """True if the process is to end."""
+        """Return whether the process is to end."""
         return self._asked.is_set()
 
     def wait(self, timeout_s: float | None = None) -> bool:
@@ -77,8 +77,8 @@ def await_line() -> bool:
 
 
 def give_way() -> None:
-    """Let other processes go first where processors are scarce: no command waits for what this
-    thread does, and those that it starts from now on.
+    """Let other processes go first if processors are scarce: no command waits for what this thread
+    does, and those that it starts from now on.
     """
     os.nice(PATIENT)
 
@@ -97,8 +97,8 @@ def run_module(
 
     It connects to the router at `endpoint` as one of `agent`'s; what it must keep is in the folder
     `state`, and what it remembers for later runs in the database `memory`. Raises NoRouterError,
-    StorageError where that folder cannot be written or the database cannot be read, and UsageError
-    for an instance's name that cannot be part of a key.
+    StorageError if that folder cannot be written or the database cannot be read, and UsageError for
+    an instance's name that cannot be part of a key.
     """
     check_name("--instance", module.instance)
     keep_freed_memory()

@@ -23,7 +23,7 @@ class Roster:
 
     @property
     def missing(self) -> dict[str, int]:
-        """The required modules, and how many instances of each are not ready."""
+        """Return the required modules that are not ready, and how many instances are missing."""
         ready = Counter(member.module for member in self._ready)
         missing = {}
         for name, number in self._required.items():

@@ -17,22 +17,23 @@ class Run(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True)
     lockstep: Annotated[
         bool,
         msgspec.Meta(
-            description="Whether every module waits for all that it depends on, so that a seed"
-            " gives the same bytes; otherwise time is the wall's, and a cycle ends at its deadline"
+            description="Whether every module waits for all that it depends on, so that a seed "
+            "gives the same bytes; otherwise time is the wall's, and a cycle ends at "
+            "its deadline."
         ),
     ] = False
     participants: Annotated[
         dict[str, Instances],
         msgspec.Meta(
-            description="Modules, and instances of each, required before time begins; in lockstep"
-            " a cycle waits for what they publish in each"
+            description="Modules, and instances of each, required before time begins; in lockstep "
+            "a cycle waits for what they publish in each."
         ),
     ] = {}
     energy: Annotated[
         bool,
         msgspec.Meta(
-            description="Whether the robot has a battery that runs down, and the town charging"
-            " places"
+            description="Whether the robot has a battery that runs down, and the town charging "
+            "places."
         ),
     ] = False
 

@@ -144,12 +144,12 @@ class Shell:
 
     @property
     def missing(self) -> dict[str, int]:
-        """The modules that it requires, and how many instances of each are not ready yet."""
+        """Return the modules that it requires, and how many instances of each are not ready yet."""
         return self._roster.missing
 
     @property
     def notes(self) -> list[str]:
-        """What its health reports in words."""
+        """Return what its health reports in words."""
         notes = [] if self._follower is None else self._follower.notes()
         if self.meter.faults:
             notes.append(f"{self.meter.faults} faults: run with --verbose to see them")
@@ -186,8 +186,8 @@ class Shell:
     ) -> None:
         """Call the module and publish what it returns, each message as soon as it is known.
 
-        Where it raises before the first, nothing but a count changes. `answers` is whether `cause`
-        is a received message.
+        If it raises before the first, nothing but a count changes. `answers` is whether `cause` is
+        a received message.
         """
         start_ns = time.time_ns()
         resumed_ns = start_ns
@@ -210,7 +210,7 @@ class Shell:
     def _guarded(
         self, handler: Callable[[], Iterable[Message]], topic: str
     ) -> Iterator[Message | None]:
-        """What `handler` returns, then None; nothing more once it raises, which is counted."""
+        """Yield what `handler` returns, then None. If it raises, count that and yield no more."""
         try:
             yield from handler()
         except MessageError as error:

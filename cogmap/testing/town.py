@@ -54,12 +54,12 @@ class Town:
 
     @property
     def graph(self) -> Graph:
-        """The agent's graph as of now."""
+        """Return the agent's graph as of now."""
         return self.observer.graph
 
     @property
     def true_poses(self) -> list[TruePose]:
-        """Where the robot was, in order; nobody but observers knows."""
+        """Return where the robot was, in order; nobody but observers knows."""
         return self.observer.of(TruePose)
 
     def run(self, seconds: float) -> None:

@@ -11,7 +11,7 @@ from cogmap.testing import context, graph_of, run_codelet
 
 
 def distance_m(graph: Graph, config: Config) -> float:
-    """What the codelet makes of 0.2 s at 2 m/s."""
+    """Return what the codelet makes of 0.2 s at 2 m/s."""
     (asked,) = due(context(rows=[(2.0, 0.0, 0.2, 0.1, 0.01)]), graph, config)
     (trip,) = run_codelet(CODELET, asked, graph, config).operations
     assert isinstance(trip, Node)

@@ -29,12 +29,12 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """One task in each cycle, with the self-motion since the cycle before."""
+    """Return one task in each cycle, with the self-motion since the cycle before."""
     return [context.task(CODELET.name, about=[TRIP], with_motions=True)]
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """The node `trip` with the distance so far. Raises MessageError without self-motion."""
+    """Return the node `trip` with the distance so far. Raises MessageError without self-motion."""
     if task.motions is None:
         raise MessageError(f"task {task.task_id} has no self-motion")
 

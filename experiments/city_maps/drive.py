@@ -77,7 +77,7 @@ def traverse(configured: Sections) -> Traversal:
 
 
 def driven(configured: Sections, modules: Sequence[Module]) -> Traversal:
-    """As `traverse`, with these modules."""
+    """Drive as `traverse` does, with these modules."""
     trajectory = configured["sim"]["trajectory"]
     landmarks = trajectory["landmarks"]
     names = tuple(landmark["name"] for landmark in landmarks)

@@ -48,13 +48,13 @@ class Environment:
 
     @property
     def area_km2(self) -> float:
-        """Of the rectangle around the buildings."""
+        """Return the area of the rectangle around the buildings."""
         width_m, height_m = np.ptp(self.buildings_m, axis=0).tolist()
         return float(width_m * height_m) / 1e6
 
     @property
     def tour_m(self) -> float:
-        """The length of the tour."""
+        """Return the length of the tour."""
         return float(sum(_step_lengths_m(leg).sum() for leg in self.legs_m))
 
     def line(self, start: int, backward: bool, lead_m: float, overrun_m: float) -> Points:
@@ -115,7 +115,7 @@ def environments(city: City, number: int, seed: int) -> list[Environment]:
 
 
 def _choose(buildings_m: Points, usable: Indices, rng: np.random.Generator) -> list[int] | None:
-    """Eight buildings in a square of random size at a random place, none too near to another.
+    """Choose eight buildings in a square of random size and place, none too near to another.
 
     None if MAX_TRIES squares have none.
     """
@@ -178,7 +178,7 @@ def _tour(streets: Streets, buildings_m: Points) -> tuple[list[int], list[Points
 
 
 def _joined(lines: Sequence[Points]) -> Points:
-    """One line, without points that coincide with the one before."""
+    """Join lines into one, without points that coincide with the one before."""
     points_m = np.vstack(lines)
     lengths_m = _step_lengths_m(points_m)
     is_step = lengths_m > SAME_POINT_M
@@ -195,6 +195,6 @@ def _beginning(line_m: Points, length_m: float) -> Points:
 
 
 def _step_lengths_m(line_m: Points) -> Points:
-    """(n - 1,): the distance from each of the (n, 2) points of a line to the next."""
+    """Return the distance from each of the (n, 2) points of a line to the next, (n - 1,)."""
     steps_m = np.diff(line_m, axis=0)
     return np.asarray(np.hypot(*steps_m.T))

@@ -31,11 +31,11 @@ OTHERS = 500_000
 
 
 def fitted(environments: Sequence[Environment], budget: Budget) -> Noise:
-    """Speed and turn noise by which maps corrected by the paper's rule err as people's do, by
+    """Fit speed and turn noise by which maps corrected by the paper's rule err as people's do, by
     coordinate descent.
 
-    One mean for two noises: others would fit as well. The traversals are others than those measured
-    with the same seed.
+    There is one mean for two noises: others would fit as well. The traversals are others than those
+    measured with the same seed.
     """
     traversals = min(budget.traversals, FIT_TRAVERSALS)
     seed = budget.seed + OTHERS

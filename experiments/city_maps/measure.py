@@ -66,13 +66,13 @@ class CityMap:
     learned: tuple[Learned, ...]
 
     def error_km2(self, method: str) -> float:
-        """Return the mean over the traversals."""
+        """Return the mean error over the traversals."""
         errors_km2 = [one.error_km2[method] for one in self.learned]
         return float(np.mean(errors_km2))
 
     @property
     def typical(self) -> Learned:
-        """The traversal whose corrected error is the median one."""
+        """Return the traversal whose corrected error is the median one."""
         errors_km2 = [one.error_km2["heading"] for one in self.learned]
         order = np.argsort(errors_km2, kind="stable")
         middle = (len(order) - 1) // 2
@@ -81,7 +81,7 @@ class CityMap:
 
 
 def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
-    """Return all environments, the same from the same seed whatever the number of processes."""
+    """Measure all environments: the same seed gives the same, whatever the number of processes."""
     every = jobs(environments, noise, budget.traversals, budget.seed)
     learned = parallel_map(traversed, every, budget.processes, budget.progress)
     maps = []
@@ -123,14 +123,14 @@ def traversed(job: Job) -> Learned:
 
 
 def by_cameras(job: Job, progress: Progress) -> Learned:
-    """As `traversed`, with buildings that are drawn and recognised."""
+    """Drive as `traversed` does, with buildings that are drawn and recognised."""
     configured = configurations(job)
     maps = rendered.by_cameras(configured, COGNITION, driven, progress)
     return _learned(job, maps)
 
 
 def configurations(job: Job) -> dict[str, Sections]:
-    """That of every module for the tour of `job`, by each method."""
+    """Return the configuration of every module for the tour of `job`, by each method."""
     rng = np.random.default_rng([job.seed, 0xCAFE, job.number])
     tour = Tour(
         start=int(rng.integers(BUILDINGS)),

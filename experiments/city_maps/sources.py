@@ -66,7 +66,7 @@ def streets_of(extract: Extract, path: Path) -> Streets:
 
 
 def middle_of(extract: Extract) -> Points:
-    """(2,): the mean longitude and latitude of an extract's nodes."""
+    """Return the mean longitude and latitude of an extract's nodes, (2,)."""
     lonlat = np.array(list(extract.nodes.values()))
     return np.asarray(lonlat.mean(axis=0))
 
@@ -136,7 +136,7 @@ def grown_environments(number: int, seed: int) -> list[Environment]:
 
 
 def _bent_grid_m(rng: np.random.Generator) -> Points:
-    """(GRID_SIDE^2, 2) crossings of blocks of many sizes, moved about, and all turned by chance."""
+    """Draw (GRID_SIDE^2, 2) crossings of blocks of many sizes, moved about, and turned together."""
     blocks_m = rng.uniform(*BLOCK_M, (2, GRID_SIDE))
     lines_m = np.cumsum(blocks_m, axis=1)
     x_m, y_m = np.meshgrid(*lines_m, indexing="ij")
@@ -163,7 +163,7 @@ def _with_houses(name: str, streets: Streets, rng: np.random.Generator) -> City:
 
 
 def _along(start_m: Points, end_m: Points, rng: np.random.Generator) -> Points:
-    """(k, 2): houses along one street, each on a side by chance."""
+    """Place houses along one street, (k, 2), each on a side by chance."""
     street_m = end_m - start_m
     length_m = float(np.hypot(*street_m))
     ahead = street_m / length_m

@@ -29,7 +29,7 @@ class Streets:
 
     @property
     def length_m(self) -> float:
-        """Of all pieces together."""
+        """Return the length of all pieces together."""
         lengths_m = self._lengths_m()
         return float(lengths_m.sum())
 
@@ -92,12 +92,12 @@ class Streets:
         return distances_m, before
 
     def _ends_m(self) -> tuple[Points, Points]:
-        """(m, 2) each: where the pieces start, and where they end."""
+        """Return where the pieces start, and where they end, (m, 2) each."""
         starts, ends = self.pieces.T
         return self.points_m[starts], self.points_m[ends]
 
     def _lengths_m(self) -> Points:
-        """(m,): of each piece."""
+        """Return the length of each piece, (m,)."""
         starts_m, ends_m = self._ends_m()
         offsets_m = ends_m - starts_m
         return np.asarray(np.hypot(*offsets_m.T))

@@ -16,7 +16,7 @@ Paths = dict[tuple[int, int], tuple[float, int]]
 
 
 def shortest_tour(distance: Matrix) -> tuple[float, list[int]]:
-    """Length and order, beginning with 0, of the shortest closed tour by (n, n) symmetric
+    """Find length and order, beginning with 0, of the shortest closed tour by (n, n) symmetric
     distances, n at most 12.
 
     Raises CogmapError if some cannot be reached.

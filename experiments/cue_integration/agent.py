@@ -20,10 +20,10 @@ CYCLES_A_TRIAL = 1000
 
 
 def modules(number: int) -> list[Module]:
-    """Workspace and one worker for trial `number`.
+    """Build workspace and one worker for trial `number`.
 
-    Codelets draw their samples by the number of the cycle: each trial has cycles of its own, as if
-    others had gone before, or chance would be the same in all.
+    Codelets draw their samples by the number of the cycle. Each trial has cycles of its own, as if
+    others had gone before: otherwise chance would be the same in all.
     """
     workspace = registry.build("workspace", SECTIONS, "workspace")
     if number and workspace.restore is not None:

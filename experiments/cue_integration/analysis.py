@@ -38,7 +38,7 @@ def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
 
 
 def turned_errors(errors_m: Points, shift: float) -> Points:
-    """Errors about the target as they are about the turned one, `shift` metres along.
+    """Return errors about the target as they are about the turned one, `shift` metres along.
 
     All is turned by 15°.
     """
@@ -105,7 +105,7 @@ class Gaussian:
 
     @classmethod
     def of(cls, errors_m: Points) -> Gaussian:
-        """As (n, 2) errors are distributed."""
+        """Fit a normal distribution to (n, 2) errors."""
         mean_m = errors_m.mean(axis=0)
         covariance_m2 = np.cov(errors_m, rowvar=False)
         return cls(mean_m, covariance_m2)
@@ -139,7 +139,7 @@ def combined(first: Gaussian, second: Gaussian) -> Gaussian:
 def alternation_log_densities(
     conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian, landmarks_share: float
 ) -> Points:
-    """Return the log densities (n,) of conflict errors where each response follows one cue alone:
+    """Return the log densities (n,) of conflict errors if each response follows one cue alone:
     landmarks in that share.
     """
     shares = [landmarks_share, 1 - landmarks_share]
@@ -156,7 +156,7 @@ def alternation_log_densities(
 def best_alternation_log_likelihood(
     conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian
 ) -> float:
-    """Return the same, with the share that makes it most."""
+    """Return the log likelihood of the same, with the share that makes it greatest."""
     likelihoods = []
 
     for share in np.linspace(0.0, 1.0, SHARES).tolist():

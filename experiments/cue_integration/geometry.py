@@ -58,18 +58,18 @@ class Pose:
 
     @property
     def position(self) -> Point:
-        """Without the heading."""
+        """Return the position without the heading."""
         return self.x_m, self.y_m
 
     def after(self, turn_rad: float, forward_m: float) -> Pose:
-        """Turned on the spot, then walked straight on."""
+        """Return the pose after a turn on the spot and then a walk straight on."""
         heading_rad = self.heading_rad + turn_rad
         x_m = self.x_m + forward_m * math.cos(heading_rad)
         y_m = self.y_m + forward_m * math.sin(heading_rad)
         return Pose(x_m, y_m, heading_rad)
 
     def towards(self, goal: Point) -> tuple[float, float]:
-        """Bearing, left positive, and distance of `goal`."""
+        """Return the bearing, left positive, and the distance of `goal`."""
         x_m, y_m = goal
         dx_m = x_m - self.x_m
         dy_m = y_m - self.y_m

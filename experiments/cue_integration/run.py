@@ -91,14 +91,14 @@ class Outcome:
 
     @property
     def optimal_sd_m(self) -> float:
-        """That of both cues, were they combined optimally."""
+        """Return the standard deviation of both cues, if they were combined optimally."""
         self_motion_m = self.sd_m(Condition.SELF_MOTION)
         landmarks_m = self.sd_m(Condition.LANDMARKS)
         return analysis.optimal_sd_m(self_motion_m, landmarks_m)
 
     @property
     def landmark_weight(self) -> float:
-        """Return what landmarks would weigh then."""
+        """Return what landmarks would weigh if cues were combined optimally."""
         self_motion_m = self.sd_m(Condition.SELF_MOTION)
         landmarks_m = self.sd_m(Condition.LANDMARKS)
         return analysis.landmark_weight(self_motion_m, landmarks_m)
@@ -173,7 +173,7 @@ class Budget:
 def measure(
     noise: Noise, budget: Budget, conditions: Sequence[Condition] = tuple(Condition)
 ) -> Outcome:
-    """Trials of each condition. The same whatever the number of processes."""
+    """Run the trials of each condition. The outcome is the same for any number of processes."""
     jobs = []
     for condition in conditions:
         for number in range(budget.trials):
@@ -192,13 +192,13 @@ def measure(
 
 
 def fitted(distance: float, budget: Budget) -> Noise:
-    """Speed and turn noise that bring self-motion's SD and RMSE nearest to those published, by
+    """Fit speed and turn noise that bring self-motion's SD and RMSE nearest to those published, by
     coordinate descent.
 
-    Only self-motion's: with distances at 3 %, no noise of self-motion makes landmarks as poor a cue
-    as in the published simulation, and a fit to all would make up for that with noise that it does
-    not have. The other conditions are predictions then. The trials are others than those that
-    `measure` runs with the same seed.
+    Only self-motion's are fitted: with distances at 3 %, no noise of self-motion makes landmarks as
+    poor a cue as in the published simulation, and a fit to all would make up for that with noise
+    that it does not have. The other conditions are predictions then. The trials are others than
+    those that `measure` runs with the same seed.
     """
     others = replace(budget, seed=budget.seed + 1)
     own = Condition.SELF_MOTION

@@ -42,7 +42,7 @@ def self_motion(turn_rad: float, forward_m: float, noise: Noise, rng: np.random.
 
 
 def _sd_of_true(felt: float, noise: float) -> float:
-    """Return the standard deviation of the true value where that times a Gaussian of mean one was
+    """Return the standard deviation of the true value if that times a Gaussian of mean one was
     felt, to the fourth order.
 
     It is more than that of the factor: who has felt little may have felt a fraction of much.

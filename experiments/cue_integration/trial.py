@@ -43,12 +43,12 @@ class Trial:
 
     @property
     def route(self) -> tuple[int, int, int]:
-        """The posts in the order in which they are picked up."""
+        """Return the posts in the order in which they are picked up."""
         return ROUTES[self.number % len(ROUTES)]
 
     @property
     def side(self) -> int:
-        """In which direction landmarks turn in a conflict: 1 counter-clockwise, -1 clockwise."""
+        """Return how landmarks turn in a conflict: 1 counter-clockwise, -1 clockwise."""
         rounds = self.number // len(ROUTES)
         is_even = rounds % 2 == 0
         return 1 if is_even else -1
@@ -81,5 +81,5 @@ class Response:
 
     @property
     def position(self) -> Point:
-        """In the room."""
+        """Return the position in the room."""
         return self.x_m, self.y_m

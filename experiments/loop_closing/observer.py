@@ -35,19 +35,19 @@ class Map:
 
     @property
     def path_error_m(self) -> float:
-        """Root mean square over the path."""
+        """Return the root mean square error over the path."""
         offsets_m = self.path_m - self.true_path_m
         return rms_m(offsets_m)
 
     @property
     def object_error_m(self) -> float:
-        """Root mean square over the objects."""
+        """Return the root mean square error over the objects."""
         offsets_m = self.objects_m - self.true_objects_m
         return rms_m(offsets_m)
 
     @property
     def end_error_m(self) -> float:
-        """Distance of the agent's estimate from where it is."""
+        """Return the distance of the agent's estimate from where it is."""
         dx_m, dy_m = self.path_m[-1] - self.true_path_m[-1]
         return float(np.hypot(dx_m, dy_m))
 
@@ -69,7 +69,7 @@ class Replayed:
 
     @classmethod
     def of(cls, replay: Replay) -> Replayed:
-        """From the event on the bus."""
+        """Make it from the event on the bus."""
         before_m = np.asarray(replay.positions_m.numpy(), float)
         shifts_m = np.asarray(replay.shifts_m.numpy(), float)
         pairs = np.asarray(replay.pairs.numpy(), np.int64)
@@ -192,7 +192,7 @@ class Observer:
 
 
 def rms_m(offsets_m: Floats) -> float:
-    """Root mean square length of (n, 2) offsets, 0 of none."""
+    """Return the root mean square length of (n, 2) offsets, 0 if there are none."""
     if not len(offsets_m):
         return 0.0
 
@@ -201,7 +201,7 @@ def rms_m(offsets_m: Floats) -> float:
 
 
 def _distances_m(positions_m: Floats, pairs: npt.NDArray[np.int64]) -> Floats:
-    """(m,): between the two places of each of (m, 2) pairs."""
+    """Return the distance between the two places of each of (m, 2) pairs, (m,)."""
     first, second = pairs.T
     offsets_m = positions_m[first] - positions_m[second]
     return np.asarray(np.hypot(*offsets_m.T))

@@ -29,14 +29,14 @@ class Laps:
 
     @property
     def ratio(self) -> float:
-        """The mean error after over that before."""
+        """Return the mean error after over that before."""
         before_m = self.before_m.mean()
         after_m = self.after_m.mean()
         return float(after_m / before_m)
 
     @property
     def helped(self) -> float:
-        """The share of laps that came nearer to the truth."""
+        """Return the share of laps that came nearer to the truth."""
         is_nearer = self.after_m < self.before_m
         return float(is_nearer.mean())
 
@@ -89,7 +89,7 @@ def _measured(
 
 
 def _displacements_m(distance_m: Floats, heading_rad: Floats) -> Floats:
-    """(..., 2): along x and y, of distances at headings of the same shape."""
+    """Return displacements along x and y, (..., 2), of distances at headings of the same shape."""
     x_m = distance_m * np.cos(heading_rad)
     y_m = distance_m * np.sin(heading_rad)
     return np.stack([x_m, y_m], axis=-1)
@@ -102,7 +102,7 @@ def _sum_before(values: Floats) -> Floats:
 
 
 def _rms_m(error_m: Floats) -> Floats:
-    """Of (laps, n, 2) errors, one a lap."""
+    """Return the root mean square of (laps, n, 2) errors, one a lap."""
     squared_m2 = np.square(error_m).sum(axis=-1)
     mean_m2 = squared_m2.mean(axis=-1)
     return np.asarray(np.sqrt(mean_m2))

@@ -103,13 +103,13 @@ def drive(seed: int, method: str) -> Loop:
 
 
 def drive_by_cameras(seed: int, progress: Progress) -> dict[str, Loop]:
-    """As `drive`, by each of METHODS, with buildings that are drawn and recognised."""
+    """Drive as `drive` does, by each of METHODS, with buildings that are drawn and recognised."""
     configured = {method: sections(seed, method) for method in METHODS}
     return rendered.by_cameras(configured, COGNITION, driven, progress)
 
 
 def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
-    """As `drive`, with these modules."""
+    """Drive as `drive` does, with these modules."""
     trajectory = configured["sim"]["trajectory"]
     places_m = {}
 

@@ -23,7 +23,7 @@ class Boundaries:
         self._tree = cKDTree(self._pieces_m.mean(axis=1)) if len(self._pieces_m) else None
 
     def are_crossed(self, lines_m: Floats, clear_m: Floats | None = None) -> Booleans:
-        """(k,): whether each of (k, 2, 2) lines crosses a boundary.
+        """Decide whether each of (k, 2, 2) lines crosses a boundary, (k,).
 
         Crossings within `clear_m` of its ends, (k, 2), do not count: they are of what stands there.
         """
@@ -50,14 +50,14 @@ class Boundaries:
 
 
 def _lengths_m(lines_m: Floats) -> Floats:
-    """(k,): the lengths of (k, 2, 2) lines."""
+    """Compute the lengths (k,) of (k, 2, 2) lines."""
     along_m = lines_m[:, 1] - lines_m[:, 0]
     return np.hypot(along_m[:, 0], along_m[:, 1])
 
 
 def _pieces(segments_m: Floats) -> Floats:
-    """Return the same segments, in pieces of at most twice their median length; in fewer where
-    those would be too many.
+    """Return the same segments, in pieces of at most twice their median length; in fewer if those
+    would be too many.
     """
     if not len(segments_m):
         return segments_m
@@ -79,8 +79,8 @@ def _pieces(segments_m: Floats) -> Floats:
 
 
 def _shares_along(lines_m: Floats, others_m: Floats) -> Floats:
-    """(k,): how far along each of (k, 2, 2) lines the other of its pair crosses it, 0 to 1; nan
-    if it does not.
+    """Return how far along each of (k, 2, 2) lines the other of its pair crosses it, (k,), 0 to 1;
+    nan if it does not.
     """
     along_m = lines_m[:, 1] - lines_m[:, 0]
     other_m = others_m[:, 1] - others_m[:, 0]
@@ -98,6 +98,6 @@ def _shares_along(lines_m: Floats, others_m: Floats) -> Floats:
 
 
 def _cross(a: Floats, b: Floats) -> Floats:
-    """(k,): the cross products of (k, 2) vectors."""
+    """Compute the cross products (k,) of (k, 2) vectors."""
     area: Floats = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
     return area

@@ -112,8 +112,8 @@ def _buildings(extract: Extract, middle: Floats) -> tuple[Floats, Floats, Indice
 def _give_functions(
     centres_m: Floats, functions: Indices, spots_m: Floats, spot_functions: Indices
 ) -> Booleans:
-    """Give buildings of unknown function that of a place inside; which places, (k,), are in no
-    building.
+    """Give buildings of unknown function that of a place inside. Return which places, (k,), are in
+    no building.
     """
     if not len(centres_m) or not len(spots_m):
         return np.ones(len(spots_m), bool)
@@ -129,7 +129,7 @@ def _give_functions(
 
 
 def _boundaries(extract: Extract, middle: Floats) -> Floats:
-    """(m, 2, 2): the pieces of all ways that separate."""
+    """Return the pieces of all ways that separate, (m, 2, 2)."""
     pieces_m = [np.zeros((0, 2, 2))]
     for way in extract.ways:
         if _separates(way.tags):

@@ -43,7 +43,7 @@ _OF_KEY = {
 
 
 def function_of(tags: Tags) -> str:
-    """One of FUNCTIONS; empty if the tags imply none."""
+    """Return one of FUNCTIONS; an empty string if the tags imply none."""
     for key, table in (("amenity", _OF_AMENITY), ("building", _OF_BUILDING)):
         function = table.get(tags.get(key, ""), "")
         if function:

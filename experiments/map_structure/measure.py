@@ -82,8 +82,8 @@ def metrics_of(found: Sequence[Structured]) -> dict[str, float | str]:
 
 
 def adjusted_rand_index(first: Indices, second: Indices) -> float:
-    """Return the adjusted Rand index of two partitions (n,) (Hubert and Arabie 1985): 1 where they
-    are the same, about 0 where they agree by chance alone.
+    """Return the adjusted Rand index of two partitions (n,) (Hubert and Arabie 1985): 1 if they are
+    the same, about 0 if they agree by chance alone.
     """
     _, row = np.unique(first, return_inverse=True)
     _, column = np.unique(second, return_inverse=True)

@@ -31,12 +31,12 @@ class Spread(NamedTuple):
 
 
 def free_ground() -> Spread:
-    """Nothing between start and goal."""
+    """Spread activation with nothing between start and goal."""
     return _spread(np.ones((SIDE, SIDE), bool))
 
 
 def walled_ground() -> Spread:
-    """Return the links across WALLS have the weight 0."""
+    """Spread activation round WALLS: the links across them have the weight 0."""
     is_free = np.ones((SIDE, SIDE), bool)
     for (first_i, first_j), (last_i, last_j) in WALLS:
         is_free[first_i : last_i + 1, first_j : last_j + 1] = False

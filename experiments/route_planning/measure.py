@@ -63,19 +63,19 @@ class Planned:
 
     @property
     def goals(self) -> int:
-        """Return how many."""
+        """Return how many goals it has."""
         return len(self.positions)
 
     @property
     def people_quartiles(self) -> tuple[float, float]:
-        """The first and the third."""
+        """Return people's first and third quartiles."""
         quartiles = np.quantile(self.people, (0.25, 0.75))
         low, high = quartiles.tolist()
         return low, high
 
     @property
     def is_within_quartiles(self) -> bool:
-        """Return if the median of the model lies within those of people."""
+        """Return whether the median of the model lies within the quartiles of people."""
         low, high = self.people_quartiles
         median = float(np.median(self.hierarchical))
         return low <= median <= high
@@ -103,12 +103,12 @@ def drawn_jobs(sizes: Sequence[int], number: int, seed: int) -> list[Job]:
 
 
 def measure(jobs: Sequence[Job], processes: int, progress: Progress) -> list[Planned]:
-    """Return every problem, in the order given, whatever the number of processes."""
+    """Plan every problem. They are in the order given, whatever the number of processes."""
     return parallel_map(planned, jobs, processes, progress)
 
 
 def planned(job: Job) -> Planned:
-    """One problem, by straight distances."""
+    """Plan one problem, by straight distances."""
     lengths = straight(job.positions)
     shortest = shortest_tour(lengths)
     tours = tours_of(lengths, job.positions, job.participants, job.seed)
@@ -129,7 +129,7 @@ def planned(job: Job) -> Planned:
 
 
 def above(lengths: Floats, tours: Sequence[Indices], shortest: Indices) -> Floats:
-    """(k,): by what share of the shortest tour each of k is longer."""
+    """Return by what share of the shortest tour each of k is longer, (k,)."""
     least = route_length(lengths, shortest, closed=True)
     found = [route_length(lengths, tour, closed=True) for tour in tours]
     excess = np.array(found) / least - 1.0

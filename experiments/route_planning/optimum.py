@@ -40,7 +40,7 @@ class _Programme:
 
     @property
     def degrees(self) -> csr_array:
-        """(count, m): which edges end in each goal."""
+        """Return which edges end in each goal, (count, m)."""
         number = len(self.edges)
         goals = self.edges.ravel()
         columns = np.repeat(np.arange(number), 2)
@@ -49,7 +49,7 @@ class _Programme:
 
     @property
     def cuts(self) -> csr_array:
-        """(k, m): which edges leave each set."""
+        """Return which edges leave each set, (k, m)."""
         first, second = self.edges.T
         rows = np.zeros((len(self.sets), len(self.edges)))
 
@@ -65,7 +65,7 @@ class _Programme:
         return _Programme(self.count, edges, lengths, self.sets)
 
     def graph(self, values: Floats) -> csr_array:
-        """(count, count), symmetric: edges that have a value, with it."""
+        """Return the edges that have a value, with it: (count, count), symmetric."""
         has_value = values > _ROUNDING
         first, second = self.edges[has_value].T
 

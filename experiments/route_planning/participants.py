@@ -53,7 +53,7 @@ def tours_of(lengths: Floats, positions: Floats, number: int, seed: int) -> Tour
 
 
 def _turned(positions: Floats, rng: np.random.Generator) -> Floats:
-    """(n, 2) positions turned by any angle, and mirrored or not."""
+    """Turn (n, 2) positions by any angle, and mirror them or not."""
     angle_rad = rng.uniform(0.0, 2 * np.pi)
     side = rng.choice([-1.0, 1.0])
     cos = np.cos(angle_rad)

@@ -27,8 +27,8 @@ SHARPNESS = 1.5
 
 
 def generate(share: npt.NDArray[np.float32], rng: np.random.Generator) -> Spikes:
-    """Spikes where a cell fires at `share` of its peak, (cells, cycles), as bits packed by eight
-    cycles.
+    """Draw the spikes of cells that fire at `share` of their peak, (cells, cycles), as bits packed
+    by eight cycles.
     """
     drawn = rng.random(share.shape, np.float32)
     fires = drawn < PEAK * share
@@ -43,7 +43,7 @@ class GridModule:
 
     @property
     def lattice_m(self) -> Values:
-        """The two steps from a field to its neighbours, as columns."""
+        """Return the two steps from a field to its neighbours, as columns."""
         row_height = np.sqrt(3) / 2
         triangular = np.array([[1.0, 0.5], [0.0, row_height]])
         return self.spacing_m * triangular
@@ -78,7 +78,7 @@ class GridModule:
         return phases_rad.astype(np.float32).T
 
     def nearest(self, centres_m: Values) -> Indices:
-        """Of positions (n, 2), the cell that has a field there."""
+        """Return for positions (n, 2) the cell that has a field there."""
         per_field = np.linalg.inv(self.lattice_m)
         fields = centres_m @ per_field.T
         steps = np.rint(fields * PHASES).astype(np.intp)
@@ -95,7 +95,7 @@ class BorderCells:
 
     @property
     def distances_m(self) -> Values:
-        """Return what each cell prefers."""
+        """Return the distance that each cell prefers."""
         end_m = self.farthest_m + BORDER_M / 2
         return np.arange(0.0, end_m, BORDER_M)
 
@@ -108,7 +108,7 @@ class BorderCells:
         return share.astype(np.float32)
 
     def nearest(self, distances_m: Values) -> Indices:
-        """Of distances (n,), the cell that prefers it."""
+        """Return for distances (n,) the cell that prefers it."""
         nearest: Indices = np.rint(distances_m / BORDER_M).astype(np.intp)
         return nearest
 
@@ -120,6 +120,6 @@ def place_centres_m(side_m: float) -> Values:
 
 
 def _pairs(values: Values) -> Values:
-    """(n^2, 2): each of `values` (n,) with each."""
+    """Pair each of `values` (n,) with each, (n^2, 2)."""
     first, second = np.meshgrid(values, values, indexing="ij")
     return np.column_stack([first.ravel(), second.ravel()])

@@ -58,7 +58,7 @@ class Posterior:
 
     @property
     def sd_m(self) -> Values:
-        """Standard deviation along x and y."""
+        """Return the standard deviation along x and y."""
         variances_m2 = np.diag(self.covariance_m2)
         return np.sqrt(variances_m2)
 
@@ -73,7 +73,7 @@ class Posterior:
 
 
 def exact(cues: Cues) -> Posterior:
-    """Bayes' rule for normal distributions: precisions add, means weigh by them."""
+    """Apply Bayes' rule for normal distributions: precisions add, means weigh by them."""
     prior_m2 = np.array(cues.covariance_m2)
     precision = np.linalg.inv(prior_m2)
     weighed = precision @ np.array(cues.mean_m)
@@ -109,8 +109,8 @@ class Recording:
 
     @property
     def posterior(self) -> Posterior:
-        """Of the samples that place cells' spikes are. Raises ValueError if there are fewer than
-        two.
+        """Return the posterior of the samples that place cells' spikes are. Raises ValueError if
+        there are fewer than two.
         """
         counts = self.counts
         if counts.sum() < 2:

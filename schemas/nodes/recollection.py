@@ -70,8 +70,8 @@ class Recollection(GraphNode, kw_only=True, frozen=True, tag="recollection"):
 
 
 def check_tree(name: str, sub_maps: Sequence[SubMap]) -> None:
-    """Raise ValueError if sub-maps are no tree: where one has no parent before it, or is there
-    twice, or an object is in two.
+    """Raise ValueError if sub-maps are no tree: if one has no parent before it, or is there twice,
+    or an object is in two.
     """
     known = {0}
     members: set[str] = set()

@@ -42,11 +42,11 @@ class BehaviourNet:
             self._gathered[_key(behaviour)] = 0.0 if chosen else behaviour.gathered
 
     def on_chosen(self, behaviour: Behaviour) -> None:
-        """The behaviour that was chosen begins to gather anew."""
+        """Let the behaviour that was chosen begin to gather anew."""
         self._gathered[_key(behaviour)] = 0.0
 
     def levels(self, behaviours: Sequence[Behaviour]) -> list[Level]:
-        """How active each of the behaviours of a broadcast is, in their order.
+        """Compute how active each of the behaviours of a broadcast is, in their order.
 
         All pass activation at once, by what they had before. One that is not instantiated is as
         active, to the others, as its results are wanted: by their mean |salience|.
@@ -76,7 +76,7 @@ class BehaviourNet:
 
 
 def passed(source: Level, target: Level) -> float:
-    """The activation that one behaviour passes to another, below 0 if it inhibits it.
+    """Compute the activation that one behaviour passes to another, below 0 if it inhibits it.
 
     Of two that would undo each other's context only the more active one inhibits.
     """
@@ -98,13 +98,13 @@ def _key(behaviour: Behaviour) -> Key:
 
 
 def _enabled(first: Behaviour, then: Behaviour) -> float:
-    """The share of a behaviour's context that is missing, and that another one brings about."""
+    """Compute the share of the context of `then` that is missing, and that `first` brings about."""
     brought = [each for each in then.context if then.context[each] <= 0.0 and each in first.adding]
     return len(brought) / max(1, len(then.context))
 
 
 def _undone(undoing: Behaviour, undone: Behaviour) -> float:
-    """The share of a behaviour's context that is there, and that another one takes away."""
+    """Compute the share of the context of `undone` that is there, and that `undoing` takes away."""
     context = undone.context
     taken = [each for each in undoing.deleting if context.get(each, 0.0) > 0.0]
     return len(taken) / max(1, len(context))

@@ -16,15 +16,15 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Literal["behaviour_net", "most_active"],
         msgspec.Meta(
             description="behaviour_net: behaviours pass activation to each other (Maes 1989), so "
-            "that one is chosen too because it leads to another. most_active: the most active one "
-            "is chosen. The net is the default, being LIDA's: by the built-in schemes the robot "
-            "drives the same with both."
+            "that one is chosen too because it leads to another. most_active: the "
+            "most active one is chosen. The net is the default, being LIDA's: by the "
+            "built-in schemes the robot drives the same with both."
         ),
     ] = "behaviour_net"
     selection_threshold: Annotated[
-        Share, msgspec.Meta(description="Activation that a behaviour needs to be chosen")
+        Share, msgspec.Meta(description="Activation that a behaviour needs to be chosen.")
     ] = 0.9
     threshold_fall: Annotated[
         Share,
-        msgspec.Meta(description="Fall of that threshold with each attempt that chooses none"),
+        msgspec.Meta(description="Fall of that threshold with each attempt that chooses none."),
     ] = 0.1

@@ -39,7 +39,7 @@ class ActionModule:
             self._resumed_cycle = self._last.cycle
 
     def last(self) -> Action:
-        """The action that was published last. Raises MessageError if none was."""
+        """Return the action that was published last. Raises MessageError if none was."""
         if self._last is None:
             raise MessageError("no action was selected yet")
         return self._last
@@ -66,7 +66,7 @@ class ActionModule:
 
 
 def build(config: Config, instance: str) -> Module:
-    """The module `action`."""
+    """Build the module `action`."""
     action = ActionModule(config)
     return (
         Module("action", instance)

@@ -22,16 +22,16 @@ class Level(NamedTuple):
 
     @property
     def is_executable(self) -> bool:
-        """Whether the scheme is instantiated."""
+        """Return whether the scheme is instantiated."""
         return not self.behaviour.rejection
 
     @property
     def rank(self) -> tuple[float, float, str]:
-        """The order in which behaviours are chosen."""
+        """Return the key that orders behaviours; the first is chosen."""
         return -self.activation, -self.behaviour.reliability, self.behaviour.scheme
 
     def as_considered(self) -> Behaviour:
-        """The behaviour with this activation, for the message."""
+        """Return the behaviour with this activation, for the message."""
         activation = min(1.0, max(0.0, self.activation)) if self.is_executable else 0.0
         return msgspec.structs.replace(
             self.behaviour, activation=activation, gathered=self.gathered
@@ -42,10 +42,10 @@ class Selector(Protocol):
     """A rule by which behaviours become active."""
 
     def levels(self, behaviours: Sequence[Behaviour]) -> list[Level]:
-        """How active each of the behaviours of a broadcast is, in their order."""
+        """Compute how active each of the behaviours of a broadcast is, in their order."""
 
     def on_chosen(self, behaviour: Behaviour) -> None:
-        """That one was chosen."""
+        """Note that this behaviour was chosen."""
 
     def restore(self, behaviours: Sequence[Behaviour]) -> None:
         """Continue from what was considered last."""
@@ -55,14 +55,14 @@ class MostActive:
     """A behaviour is as active as the broadcast has made its scheme."""
 
     def levels(self, behaviours: Sequence[Behaviour]) -> list[Level]:
-        """How active each of the behaviours of a broadcast is, in their order."""
+        """Compute how active each of the behaviours of a broadcast is, in their order."""
         return [Level(each, each.activation) for each in behaviours]
 
     def on_chosen(self, behaviour: Behaviour) -> None:
-        """Nothing: the next broadcast begins anew."""
+        """Do nothing: the next broadcast begins anew."""
 
     def restore(self, behaviours: Sequence[Behaviour]) -> None:
-        """Nothing, for nothing is kept."""
+        """Do nothing, for nothing is kept."""
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ class ActionSelection:
         self._selector.restore(action.behaviours)
 
     def select(self, behaviours: Sequence[Behaviour]) -> Selection:
-        """The behaviour for a broadcast, by those of it that are instantiated."""
+        """Choose the behaviour for a broadcast, by those of it that are instantiated."""
         levels = self._selector.levels(behaviours)
         executable = [level for level in levels if level.is_executable]
         best = min(executable, key=lambda level: level.rank, default=None)
@@ -110,7 +110,7 @@ class ActionSelection:
 def _rejected(
     levels: Sequence[Level], reason: Rejection, best: Level | None = None
 ) -> list[Behaviour]:
-    """The behaviours, rejected where they were instantiated and are not the best."""
+    """Return the behaviours, rejected if they were instantiated and are not the best."""
     considered = []
     for level in levels:
         behaviour = level.as_considered()

@@ -20,7 +20,7 @@ MAX_CELLS = 2**16
 def written_cells(
     column: PlaceColumn, cells: Indices, values: npt.ArrayLike
 ) -> Iterator[Operation]:
-    """The operations that write (k,) values in (k, 2) cells of a column of the root map."""
+    """Yield the operations that write (k,) values in (k, 2) cells of a column of the root map."""
     new = np.asarray(values, np.float32)
     for start in range(0, len(cells), MAX_CELLS):
         some = slice(start, start + MAX_CELLS)
@@ -33,8 +33,8 @@ def written_cells(
 
 
 def changed_cells(map_id: str, known: Window, after: Singles) -> list[Operation]:
-    """The operations that write those cells of a map whose value in one of the columns of `known`
-    is another in (k, w, h) `after`; none of a column that does not change.
+    """Return the operations that write those cells of a map whose value in one of the columns of
+    `known` differs in (k, w, h) `after`; none for a column that does not change.
     """
     column, i, j = np.nonzero(after != known.values)
     values = after[column, i, j]

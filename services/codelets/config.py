@@ -26,27 +26,25 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 
     samples: Annotated[
         int,
-        Meta(
-            description="Monte-Carlo samples of the agent's pose, 10 to 100000", ge=10, le=100_000
-        ),
+        Meta(description="Monte-Carlo samples of the agent's pose.", ge=10, le=100_000),
     ] = 800
     kept_samples: Annotated[
         int,
         Meta(
-            description="samples that rejection leaves at least, some drawn repeatedly, 1 to 10000",
+            description="Samples that rejection leaves at least, some drawn repeatedly.",
             ge=1,
             le=10_000,
         ),
     ] = 200
     landmark_samples: Annotated[
         int,
-        Meta(description="samples of each landmark's position, 10 to 10000", ge=10, le=10_000),
+        Meta(description="Samples of each landmark's position.", ge=10, le=10_000),
     ] = 200
     correlated_views: Annotated[
         float,
         Meta(
-            description="successive views of a landmark whose errors are alike, so that together "
-            "they count as one, 1 to 10000; 1 takes each for independent, as eq. 1 does",
+            description="Successive views of a landmark whose errors are alike, so that together "
+            "they count as one; 1 takes each for independent, as eq. 1 does.",
             ge=1,
             le=10_000,
         ),
@@ -54,105 +52,92 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     largest_landmark_sd_m: Annotated[
         PositiveMetres,
         Meta(
-            description="landmarks whose position is less certain do not inform localization, "
-            "standard deviation in m, above 0, at most 10000"
+            description="Landmarks whose position is less certain do not inform localization, "
+            "standard deviation in m."
         ),
     ] = 4.0
     landmark_jitter_m: Annotated[
         PositiveMetres,
         Meta(
-            description="least noise added to a landmark's samples at each view, standard "
-            "deviation in m, above 0, at most 10000"
+            description="Least noise added to a landmark's samples at each view, standard "
+            "deviation in m."
         ),
     ] = 0.03
     speed_gain_sd: Annotated[
         Gain,
-        Meta(description="standard deviation of the gain error of speed, a share, 0 to 1"),
+        Meta(description="Standard deviation of the gain error of speed, a share."),
     ] = 0.0
     turn_gain_sd: Annotated[
         Gain,
-        Meta(description="standard deviation of the gain error of turn rate, a share, 0 to 1"),
+        Meta(description="Standard deviation of the gain error of turn rate, a share."),
     ] = 0.0
     drift_rad_per_m: Annotated[
         Gain,
-        Meta(description="standard deviation of the drift of heading, rad per m, 0 to 1"),
+        Meta(description="Standard deviation of the drift of heading, rad per m."),
     ] = 0.0
     range_gain_sd: Annotated[
         Gain,
-        Meta(description="standard deviation of the gain error of range, a share, 0 to 1"),
+        Meta(description="Standard deviation of the gain error of range, a share."),
     ] = 0.0
     path_spacing_m: Annotated[
         PositiveMetres,
-        Meta(description="distance between places of the path, in m, above 0, at most 10000"),
+        Meta(description="Distance between places of the path, in m."),
     ] = 1.0
     revisit_s: Annotated[
         Seconds,
-        Meta(
-            description="time after which a landmark or place seen again may close a loop, in s, "
-            "above 0"
-        ),
+        Meta(description="Time after which a landmark or place seen again may close a loop, in s."),
     ] = 20.0
     closure_spacing_s: Annotated[
         Seconds,
-        Meta(description="least time between two loop closures by the same cue, in s, above 0"),
+        Meta(description="Least time between two loop closures by the same cue, in s."),
     ] = 2.0
     path_variance_per_m: Annotated[
         Positive,
-        Meta(
-            description="least variance of path integration's position, m^2 per m, above 0, at "
-            "most 100"
-        ),
+        Meta(description="Least variance of path integration's position, m^2 per m."),
     ] = 1e-4
     heading_variance_per_m: Annotated[
         Positive,
-        Meta(
-            description="least variance of path integration's heading, rad^2 per m, above 0, at "
-            "most 100"
-        ),
+        Meta(description="Least variance of path integration's heading, rad^2 per m."),
     ] = 1e-6
     heading_variance_per_rad: Annotated[
         Positive,
-        Meta(
-            description="least variance of path integration's heading, rad^2 per rad turned, "
-            "above 0, at most 100"
-        ),
+        Meta(description="Least variance of path integration's heading, rad^2 per rad turned."),
     ] = 1e-5
     correct: Annotated[
         Literal["positions", "heading"],
         Meta(
-            description="what map correction corrects: positions alone, by reverse replay "
-            "(eq. 9), or headings too, by nonlinear least squares"
+            description="What map correction corrects: positions alone, by reverse replay (eq. "
+            "9), or headings too, by nonlinear least squares."
         ),
     ] = "heading"
     anchor: Annotated[
         Literal["start", "map"],
         Meta(
-            description="what stays in place when the map is corrected. start: where the path "
-            "begins, for goals and maps that are given relative to it. map: the path that was "
-            "corrected before, as a whole, so that an agent whose heading at the start is little "
-            "known does not have all its map turned by what it learns of that"
+            description="What stays in place when the map is corrected. start: where the path "
+            "begins, for goals and maps that are given relative to it. map: the path "
+            "that was corrected before, as a whole, so that an agent whose heading at "
+            "the start is little known does not have all its map turned by what it "
+            "learns of that."
         ),
     ] = "start"
     landmarks: Annotated[
         Literal["buildings", "points"],
         Meta(
-            description="what landmarks are for map correction. buildings: successive sightings "
-            "of one of their sides err alike, and each side errs by itself. points: all sightings "
-            "err independently"
+            description="What landmarks are for map correction. buildings: successive sightings "
+            "of one of their sides err alike, and each side errs by itself. points: "
+            "all sightings err independently."
         ),
     ] = "buildings"
     place_match_sd_m: Annotated[
         PositiveMetres,
         Meta(
-            description="standard deviation of the position at which a place is recognised, in m, "
-            "above 0, at most 10000"
+            description="Standard deviation of the position at which a place is recognised, in m."
         ),
     ] = 2.0
     place_match_sd_rad: Annotated[
         float,
         Meta(
-            description="standard deviation of the heading at which a place is recognised, in "
-            "rad, above 0, at most 3.2",
+            description="Standard deviation of the heading at which a place is recognised, in rad.",
             gt=0,
             le=3.2,
         ),
@@ -160,8 +145,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     sparse_after_s: Annotated[
         Seconds,
         Meta(
-            description="age from which on a place of the path is joined into an older one that "
-            "stood there already, in s, above 0, at most 1e9; until then a mistaken loop closure "
-            "can be taken back"
+            description="Age from which on a place of the path is joined into an older one that "
+            "stood there already, in s; until then a mistaken loop closure can be "
+            "taken back."
         ),
     ] = 300.0

@@ -107,7 +107,7 @@ class Worker:
 
 
 def build(instance: str, codelets: Iterable[ConfiguredCodelet]) -> Module:
-    """The module `codelets`, one worker of it."""
+    """Build one worker of the module `codelets`."""
     graph = Graph()
     worker = Worker(instance, graph, codelets)
 

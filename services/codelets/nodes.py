@@ -12,7 +12,7 @@ K = TypeVar("K", bound=GraphNode)
 
 
 def nodes_of(graph: Graph, kind: type[K], names: Iterable[str]) -> list[K]:
-    """The nodes of that kind that the graph has by these ids, in their order."""
+    """Return the nodes of that kind that the graph has by these ids, in their order."""
     found = []
     for name in names:
         node = graph.get(kind, name)

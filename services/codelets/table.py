@@ -58,21 +58,21 @@ ROWS = (
 
 @cache
 def own_codelets() -> tuple[Codelet, ...]:
-    """Our codelets, in the order of ROWS."""
+    """Return our codelets, in the order of ROWS."""
     modules = [import_module(f"{__package__}.{row.module}") for row in ROWS]
     return tuple(module.CODELET for module in modules)
 
 
 @cache
 def own_settings() -> dict[str, type[msgspec.Struct]]:
-    """The types of our codelets' settings, by section."""
+    """Return the types of our codelets' settings, by section."""
     named = {row.settings for row in ROWS if row.settings}
     modules = [import_module(f"{__package__}.{name}") for name in sorted(named)]
     return {module.SECTION: module.Config for module in modules}
 
 
 def all_codelets() -> tuple[Codelet, ...]:
-    """Our codelets, then those of other packages, by name.
+    """Return our codelets, then those of other packages, by name.
 
     Raises ConfigError if an entry point is no codelet or cannot be imported, or a name is taken.
     """
@@ -104,7 +104,7 @@ def all_codelets() -> tuple[Codelet, ...]:
 def configured(
     sections: config.Sections, codelets: Iterable[Codelet]
 ) -> tuple[ConfiguredCodelet, ...]:
-    """`codelets` with their settings from `sections`. Raises ConfigError."""
+    """Give `codelets` their settings from `sections`. Raises ConfigError."""
     return tuple(
         ConfiguredCodelet(codelet, config.typed(sections, codelet.section, codelet.config))
         for codelet in codelets

@@ -18,10 +18,11 @@ class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
     share: Annotated[
         Share,
         msgspec.Meta(
-            description="how much likelier all names together are, at most, for what was conscious "
-            "just before, as a share of 1; at 0 nothing is primed. LIDA: 0.9 of a node's "
-            "activation is passed on (upscale; downscale 0.5), and added; here it changes the "
-            "prior of names, because activation is the probability of a name"
+            description="How much likelier all names together are, at most, for what was "
+            "conscious just before, as a share of 1; at 0 nothing is primed. LIDA: "
+            "0.9 of a node's activation is passed on (upscale; downscale 0.5), and "
+            "added; here it changes the prior of names, because activation is the "
+            "probability of a name."
         ),
     ] = 0.5
     half_life_s: Annotated[
@@ -29,17 +30,19 @@ class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
         msgspec.Meta(
             gt=0,
             le=3600,
-            description="the activation of a PAM node halves in so many seconds after it was "
-            "conscious. LIDA: falls by 0.05 a tick, to 0 in 100 ms; here halves in 3 s, because a "
-            "view is primed by what was conscious two views, 400 ms, before it",
+            description="The activation of a PAM node halves in so many seconds after it was "
+            "conscious. LIDA: falls by 0.05 a tick, to 0 in 100 ms; here halves in 3 "
+            "s, because a view is primed by what was conscious two views, 400 ms, "
+            "before it.",
         ),
     ] = 3.0
     feeling_threshold: Annotated[
         Share,
         msgspec.Meta(
-            description="a percept has the feelings that its PAM node activates more than so much. "
-            "LIDA: 0.7, PAM's threshold of percepts; here 0.3, because one encounter is to be "
-            "enough, after which the link to a feeling has a weight of 0.5"
+            description="A percept has the feelings that its PAM node activates more than so "
+            "much. LIDA: 0.7, PAM's threshold of percepts; here 0.3, because one "
+            "encounter is to be enough, after which the link to a feeling has a "
+            "weight of 0.5."
         ),
     ] = 0.3
 
@@ -55,53 +58,54 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     priming: Annotated[
         Priming,
         msgspec.Meta(
-            description="how what was conscious makes perception expect what goes with it"
+            description="How what was conscious makes perception expect what goes with it."
         ),
     ] = Priming()
     segments_weights: Annotated[
         WeightsPath,
-        msgspec.Meta(description="ONNX file of the segmentation network; empty: the built-in one"),
+        msgspec.Meta(description="ONNX file of the segmentation network; empty: the built-in one."),
     ] = ""
     object_weights: Annotated[
         WeightsPath,
         msgspec.Meta(
             description="ONNX file of the embedding network, with its prototypes in a .json file "
-            "beside it; empty: the built-in one"
+            "beside it; empty: the built-in one."
         ),
     ] = ""
     road_weights: Annotated[
         WeightsPath,
-        msgspec.Meta(description="ONNX file of the road network; empty: the built-in one"),
+        msgspec.Meta(description="ONNX file of the road network; empty: the built-in one."),
     ] = ""
     processor: Annotated[
         Processor,
         msgspec.Meta(
-            description="what runs the networks. gpu: the GPU for which the installed ONNX Runtime "
-            "has a provider, as onnxruntime-gpu has for CUDA; sums may round differently there, so "
-            "a log is replayed to the byte by the processor that it was recorded with"
+            description="What runs the networks. gpu: the GPU for which the installed ONNX "
+            "Runtime has a provider, as onnxruntime-gpu has for CUDA; sums may round "
+            "differently there, so a log is replayed to the byte by the processor "
+            "that it was recorded with."
         ),
     ] = "cpu"
     percept_threshold: Annotated[
         Share,
         msgspec.Meta(
-            description="a segment is a percept if it shows a building with a higher probability. "
-            "LIDA: 0.7 of total activation; here of that probability, because which building it "
-            "is, is decided by its evidence when it enters the workspace"
+            description="A segment is a percept if it shows a building with a higher probability. "
+            "LIDA: 0.7 of total activation; here of that probability, because which "
+            "building it is, is decided by its evidence when it enters the workspace."
         ),
     ] = 0.7
     familiar: Annotated[
         Share,
         msgspec.Meta(
-            description="a building that is well visible gets a PAM node unless it is recognized "
-            "as one that was taught with a higher activation: a stranger that is like that has a "
-            "name of its own, too"
+            description="A building that is well visible gets a PAM node unless it is recognized "
+            "as one that was taught with a higher activation: a stranger that is like "
+            "that has a name of its own, too."
         ),
     ] = 0.85
     familiar_learned: Annotated[
         Share,
         msgspec.Meta(
-            description="the activation for one that was learned, in the place of `familiar`; "
-            "higher, because one encounter teaches less of a building, and a second node for it "
-            "does less harm than one node for two buildings"
+            description="The activation for one that was learned, in the place of `familiar`; "
+            "higher, because one encounter teaches less of a building, and a second "
+            "node for it does less harm than one node for two buildings."
         ),
     ] = 0.97

@@ -116,7 +116,7 @@ class ExtendedPam:
         return self._recognizable(self._standing(view, camera))
 
     def _standing(self, view: ViewArrays, camera: Calibration) -> Standing:
-        """The segments that are wide enough and have known depth."""
+        """Find the segments that are wide enough and have known depth."""
         segments = []
         of_segments = []
         for segment in self._segmenter.segments(view.image, view.depth_m, camera):
@@ -130,7 +130,7 @@ class ExtendedPam:
         return Standing(segments, of_segments, embedding)
 
     def _recognizable(self, standing: Standing) -> list[Candidate]:
-        """The candidates of these segments, recognized without a prior."""
+        """Recognize the candidates of these segments, without a prior."""
         appearances = self._recognizer.appearances(standing.embedding)
         return [
             Candidate(segment, of_segment, self._recognizer.recognize(appearance))
@@ -147,7 +147,7 @@ class ExtendedPam:
 
     @property
     def learned(self) -> list[LearnedObject]:
-        """Every node learned since the teaching."""
+        """Return every node learned since the teaching."""
         return [
             LearnedObject(label=label, embedding=Array.of(embedding))
             for label, embedding in self._recognizer.learned
@@ -156,7 +156,7 @@ class ExtendedPam:
     def _labelled(
         self, candidates: list[Candidate], view: ViewArrays, learning: bool, prior: Prior
     ) -> tuple[list[Candidate], list[LearnedObject]]:
-        """The percepts, at most one of each label, from left to right, and what was learned.
+        """Return the percepts, at most one a label, from left to right, and what was learned.
 
         Candidates are labelled in the order of their activation, so that of two with one label the
         likelier one has it.
@@ -211,7 +211,7 @@ class ExtendedPam:
     def _recognized(
         self, candidate: Candidate, prior: Prior, excluded: Container[str] = ()
     ) -> Candidate:
-        """`candidate` recognized by all that is known by now, except by labels `excluded`."""
+        """Recognize `candidate` by all that is known by now, except by labels `excluded`."""
         log_prior = prior.log_ratio(self._recognizer.labels)
         appearance = candidate.recognition.appearance
         recognition = self._recognizer.recognize(appearance, excluded, log_prior)
@@ -224,8 +224,8 @@ class ExtendedPam:
 
 
 def _percepts(found: list[Candidate], camera: Calibration) -> list[Percept]:
-    """Each is placed by its known footprint if that fits what is seen, else as a building of the
-    usual size.
+    """Place each percept by its known footprint if that fits what is seen, else as a building of
+    the usual size.
     """
     # Those whose size is known, and of which at least one true end is seen.
     silhouettes: list[Silhouette | None] = []

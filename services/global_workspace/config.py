@@ -24,29 +24,30 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     """Thresholds and times of the competition, in ticks of 5 ms."""
 
     no_broadcast_ticks: Annotated[
-        TickCount, msgspec.Meta(description="Time without a broadcast that triggers one, in ticks")
+        TickCount, msgspec.Meta(description="Time without a broadcast that triggers one, in ticks.")
     ] = 100
     aggregate_above: Annotated[
         ActivationSum,
-        msgspec.Meta(description="Sum of activations above which a broadcast is triggered"),
+        msgspec.Meta(description="Sum of activations above which a broadcast is triggered."),
     ] = 0.8
     coalition_above: Annotated[
         ActivationSum,
         msgspec.Meta(
             description="Activation of one coalition above which one is triggered. LIDA: 0.5; "
-            "here 0.45, because content without salience has 0.5 at most and never exceeds it: it "
-            "would be broadcast by the other triggers alone, in each third cycle at most"
+            "here 0.45, because content without salience has 0.5 at most and never "
+            "exceeds it: it would be broadcast by the other triggers alone, in each "
+            "third cycle at most."
         ),
     ] = 0.45
     refractory_ticks: Annotated[
         TickCount,
-        msgspec.Meta(description="Time after a broadcast in which none is triggered, in ticks"),
+        msgspec.Meta(description="Time after a broadcast in which none is triggered, in ticks."),
     ] = 40
     decay: Annotated[
         Share,
         msgspec.Meta(
             description="Activation that a coalition loses in a cycle of 40 ticks. LIDA: 0.1 in a "
-            "tick; here in a cycle, because coalitions come once in each: at 0.1 a tick none "
-            "would be left for the next competition"
+            "tick; here in a cycle, because coalitions come once in each: at 0.1 a "
+            "tick none would be left for the next competition."
         ),
     ] = 0.1

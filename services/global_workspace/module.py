@@ -43,7 +43,7 @@ class Candidate:
     activation: float
 
     def with_fate(self, fate: Fate) -> Contender:
-        """The candidate as the competition reports it."""
+        """Return the candidate as the competition reports it."""
         return Contender(
             id=self.id,
             codelet=self.coalition.codelet,
@@ -126,7 +126,7 @@ class GlobalWorkspace:
         return decayed
 
     def _decide(self) -> tuple[Silence, Trigger]:
-        """The reason why nothing is broadcast now, or the first trigger whose condition is met."""
+        """Find why nothing is broadcast now, or the first trigger whose condition is met."""
         config = self._config
         if not self._candidates:
             return Silence.NO_COALITION, Trigger.NONE
@@ -156,7 +156,7 @@ def _ticks(duration_ns: int) -> float:
 
 
 def build(config: Config, instance: str) -> Module:
-    """The module `global_workspace`."""
+    """Build the module `global_workspace`."""
     workspace = GlobalWorkspace(config)
     return Module("global_workspace", instance).on(
         topics.COALITIONS,

@@ -40,7 +40,7 @@ class Associations:
             self._objects.put((name, number), vector)
 
     def reminded_of(self, looks: Sequence[str], at_m: Floats) -> list[str]:
-        """The maps that objects here, (n, 2), remind of, by how many of them do."""
+        """Return the maps that objects here, (n, 2), remind of, by how many of them do."""
         votes: Counter[str] = Counter()
         for vector in self._encoded(looks, at_m):
             name = self._map_of(vector)
@@ -50,7 +50,7 @@ class Associations:
         return [name for name, _ in sorted(votes.items(), key=lambda vote: (-vote[1], vote[0]))]
 
     def _map_of(self, cue: Bytes) -> str | None:
-        """The map of the stored object that a cue recalls; None if it recalls none."""
+        """Return the map of the stored object that a cue recalls; None if it recalls none."""
         recall = self._memory.read(cue)
         if recall is None:
             return None
@@ -59,7 +59,7 @@ class Associations:
         return None if nearest is None else nearest[0]
 
     def _encoded(self, looks: Sequence[str], at_m: Floats) -> list[Bytes]:
-        """A vector for each object."""
+        """Encode each object as a vector."""
         offsets_m = at_m[:, None] - at_m
         apart_m = np.hypot(offsets_m[..., 0], offsets_m[..., 1])
         nearest = np.argsort(apart_m, axis=1, kind="stable")[:, 1 : 1 + NEIGHBOURS]

@@ -22,13 +22,13 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Cycles,
         msgspec.Meta(
             description="Cycles between two times at which what has changed on a map that was "
-            "broadcast is stored"
+            "broadcast is stored."
         ),
     ] = 25
     recall_cycles: Annotated[
         Cycles,
         msgspec.Meta(
-            description="Cycles between two attempts to recall the map around, and an episode"
+            description="Cycles between two attempts to recall the map around, and an episode."
         ),
     ] = 5
     max_returned: Annotated[
@@ -36,7 +36,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             ge=1,
             le=1000,
-            description="Objects that come back in one recall at most, the nearest first",
+            description="Objects that come back in one recall at most, the nearest first.",
         ),
     ] = 4
     compared_maps: Annotated[
@@ -45,7 +45,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             ge=1,
             le=1000,
             description="Stored maps that are compared with the objects around: if there are "
-            "more, those that sparse distributed memory is reminded of",
+            "more, those that sparse distributed memory is reminded of.",
         ),
     ] = 5
     sparse: Annotated[SparseConfig, msgspec.Meta(description="The sparse distributed memory.")] = (

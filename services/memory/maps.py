@@ -29,18 +29,18 @@ class RememberedMap:
 
     @property
     def keys(self) -> list[str]:
-        """The keys of its records."""
+        """Return the keys of its records."""
         whole = [each.key for each in (self.known, self.tree) if each is not None]
         return whole + [tile_key(self.name, x, y) for x, y in sorted(self.tiles)]
 
     @property
     def looks(self) -> list[str]:
-        """What each of its objects looks like."""
+        """Return what each of its objects looks like."""
         return [] if self.known is None else [look_of(label) for label in self.known.labels]
 
     @property
     def at_m(self) -> Floats:
-        """(n, 2): where its objects stand."""
+        """Return where its objects stand, (n, 2)."""
         if self.known is None:
             return np.zeros((0, 2))
 
@@ -68,16 +68,16 @@ class RememberedMaps:
                 remembered.tree = record
 
     def forget(self, name: str) -> list[str]:
-        """Remove a map, where there is one of that name; the keys of its records."""
+        """Remove the map of that name, if there is one; return the keys of its records."""
         forgotten = self._maps.pop(name, None)
         return [] if forgotten is None else forgotten.keys
 
     def get(self, name: str) -> RememberedMap | None:
-        """The map of that name; None if there is none."""
+        """Return the map of that name; None if there is none."""
         return self._maps.get(name)
 
     def others(self, name: str) -> list[RememberedMap]:
-        """The maps with objects but for one, by name."""
+        """Return the maps with objects, except the one of that name, sorted by name."""
         found = []
         for other in sorted(self._maps):
             remembered = self._maps[other]
@@ -87,7 +87,7 @@ class RememberedMaps:
         return found
 
     def next_name(self) -> str:
-        """A name that no map has, by the next number."""
+        """Make a name that no map has, with the first free number."""
         number = 1
         while f"{NUMBERED}{number}" in self._maps:
             number += 1

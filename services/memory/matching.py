@@ -42,13 +42,13 @@ class Match(NamedTuple):
 
     @property
     def matched(self) -> int:
-        """How many landmarks here stand where one there does."""
+        """Return how many landmarks here stand where one there does."""
         return int((self.there != NOWHERE).sum())
 
 
 def best_matches(here: Landmarks, there: Landmarks, within_m: float) -> tuple[Match, int] | None:
-    """The match of most landmarks, and how many the best one at any other pose has; None if no
-    two landmarks of each are alike.
+    """Find the match of most landmarks, and how many the best match at any other pose has; None if
+    no two landmarks of each are alike.
     """
     poses = _hypotheses(here, there, within_m)
     if not len(poses):
@@ -76,7 +76,7 @@ def best_matches(here: Landmarks, there: Landmarks, within_m: float) -> tuple[Ma
 
 
 def _hypotheses(here: Landmarks, there: Landmarks, within_m: float) -> Floats:
-    """(h, 3): poses by which two landmarks here come to stand where two alike do there."""
+    """Find (h, 3) poses that bring two landmarks here to where two alike stand there."""
     looks = 1 + max(here.looks.max(initial=0), there.looks.max(initial=0))
     pairs_here, apart_here_m = _pairs(here)
     pairs_there, apart_there_m = _pairs(there)
@@ -99,15 +99,15 @@ def _hypotheses(here: Landmarks, there: Landmarks, within_m: float) -> Floats:
 
 
 def _codes(landmarks: Landmarks, pairs: Indices, looks: int) -> Indices:
-    """(p,): a number for the looks of each of (p, 2) pairs."""
+    """Return a number for the looks of each of (p, 2) pairs, (p,)."""
     first, second = landmarks.looks[pairs].T
     codes: Indices = first * looks + second
     return codes
 
 
 def _pairs(landmarks: Landmarks) -> tuple[Indices, Floats]:
-    """(p, 2) landmarks neither too near each other nor too far apart, in both orders, and the
-    distance between them, (p,).
+    """Find the (p, 2) pairs of landmarks neither too near each other nor too far apart, in both
+    orders, and the distance between the two, (p,).
     """
     offsets_m = landmarks.at_m[:, None] - landmarks.at_m
     apart_m = np.hypot(offsets_m[..., 0], offsets_m[..., 1])
@@ -116,13 +116,13 @@ def _pairs(landmarks: Landmarks) -> tuple[Indices, Floats]:
 
 
 def _direction(pairs_m: Floats) -> Floats:
-    """(h,): the direction from the first to the second of (h, 2, 2) pairs."""
+    """Compute the direction from the first to the second of (h, 2, 2) pairs, (h,)."""
     along_m = pairs_m[:, 1] - pairs_m[:, 0]
     return np.arctan2(along_m[:, 1], along_m[:, 0])
 
 
 def _counts(poses: Floats, here: Landmarks, there: Landmarks, within_m: float) -> Indices:
-    """(h,): how many landmarks here each pose places where one alike stands."""
+    """Count the landmarks here that each pose places where one alike stands, (h,)."""
     counts = np.zeros(len(poses), np.int64)
     for look, at_m in zip(here.looks.tolist(), here.at_m, strict=True):
         alike_m = there.at_m[there.looks == look]
@@ -138,7 +138,7 @@ def _counts(poses: Floats, here: Landmarks, there: Landmarks, within_m: float) -
 
 
 def _belonging(pose: Floats, here: Landmarks, there: Landmarks, within_m: float) -> Indices:
-    """(n,): the landmark there that each landmark here belongs to by a pose, no two to one."""
+    """Find the landmark there that each landmark here belongs to by a pose, (n,), no two to one."""
     moved_m = transform_from(pose, here.at_m)
     offsets_m = moved_m[:, None] - there.at_m
     away_m = np.hypot(offsets_m[..., 0], offsets_m[..., 1])

@@ -33,16 +33,16 @@ class CompetitionGate:
         self._awaits_broadcast = False
 
     def on_competition(self, competition: Competition) -> None:
-        """The global workspace has come so far."""
+        """Note how far the global workspace has come."""
         self._competition_cycle = competition.cycle
         self._awaits_broadcast = bool(competition.trigger)
 
     def on_broadcast(self, broadcast: Broadcast) -> None:
-        """A broadcast has come."""
+        """Note that a broadcast has come."""
         self._broadcast_cycle = broadcast.cycle
 
     def is_open(self, cycle: int) -> bool:
-        """Whether what the end of `cycle` leads to may be computed."""
+        """Decide whether what follows from the end of `cycle` may be computed."""
         is_behind = self._broadcast_cycle < self._competition_cycle
         lacks_broadcast = self._awaits_broadcast and is_behind
         return self._competition_cycle >= cycle - 1 and not lacks_broadcast
@@ -67,7 +67,7 @@ class LongTermMemory:
         self._scan_ns = NEVER_NS
 
     def on_restored(self, restored: Restored) -> None:
-        """Know what the database holds."""
+        """Take up what the database holds."""
         self._spatial.restore(restored.records)
         self._episodic.restore(restored.records)
 
@@ -78,12 +78,12 @@ class LongTermMemory:
         self._episodic.resume(stored)
 
     def learned(self) -> Stored:
-        """What stands for all that this run has stored."""
+        """Return the records that stand for all that this run has stored."""
         records = [*self._spatial.learned(), *self._episodic.learned()]
         return Stored(cycle=self._graph.cycle, records=records)
 
     def on_broadcast(self, broadcast: Broadcast) -> list[Message]:
-        """What is conscious is to be learned."""
+        """Take what is conscious, to learn it."""
         self._gate.on_broadcast(broadcast)
         self._spatial.on_broadcast(broadcast)
         self._episodic.on_broadcast(broadcast)
@@ -92,13 +92,13 @@ class LongTermMemory:
         return self._replies()
 
     def on_competition(self, competition: Competition) -> list[Message]:
-        """A cycle's competition has ended."""
+        """Note that a cycle's competition has ended."""
         self._gate.on_competition(competition)
         return self._replies()
 
     def on_scan(self, scan: RangeScan) -> list[Message]:
-        """A scan that is repeated shows that everything waits, as after a restart of another
-        module: then no broadcast will come.
+        """Reply at once to a repeated scan. It shows that everything waits, as after a restart of
+        another module: then no broadcast will come.
         """
         is_repeated = scan.stamp_ns == self._scan_ns
         self._scan_ns = scan.stamp_ns
@@ -126,7 +126,7 @@ class LongTermMemory:
         return self._replies(at_once=True)
 
     def _replies(self, at_once: bool = False) -> list[Message]:
-        """What the end of the newest cycle leads to, once that is settled."""
+        """Return what follows from the end of the newest cycle, once that is settled."""
         stamp_ns = self._ended_ns
         cycle = self._graph.cycle
         is_open = at_once or not self._is_lockstep or self._gate.is_open(cycle)
@@ -138,10 +138,10 @@ class LongTermMemory:
         return [*self._store(cycle, stamp_ns), *self._recall(cycle, stamp_ns)]
 
     def _store(self, cycle: int, stamp_ns: int) -> list[Message]:
-        """What is new on the map and in episodes, where the map was broadcast before this cycle and
-        not stored since.
+        """Store what is new on the map and in episodes, if the map was broadcast before this cycle
+        and not stored since.
 
-        What is broadcast in this cycle may come sooner or later: it counts in the next.
+        A broadcast in this cycle may come sooner or later: it counts in the next.
         """
         was_broadcast = any(each < cycle for each in self._broadcast_in)
         if not was_broadcast or cycle - self._stored_cycle < self._config.store_cycles:
@@ -159,8 +159,8 @@ class LongTermMemory:
         return [Stored(stamp_ns=stamp_ns, cycle=cycle, records=records, forgotten=forgotten)]
 
     def _recall(self, cycle: int, stamp_ns: int) -> list[Message]:
-        """An offer of the map, the episode and the objects that are recalled; in lockstep, of
-        nothing if none is.
+        """Offer the map, the episode and the objects that are recalled; in lockstep, send an empty
+        offer if none is.
         """
         operations: list[Operation] = []
         if cycle % self._config.recall_cycles == 0:
@@ -176,7 +176,7 @@ class LongTermMemory:
 
 
 def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
-    """The module `memory`."""
+    """Build the module `memory`."""
     graph = Graph()
     memory = LongTermMemory(config, graph, run)
     published = (topics.STORED, topics.OFFER)

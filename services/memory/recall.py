@@ -43,7 +43,7 @@ class Recalled(NamedTuple):
 
 
 def cues(learned: Iterable[Object], agent_m: tuple[float, float]) -> list[Object]:
-    """The objects that cue a recall: the nearest to the agent."""
+    """Return the objects that cue a recall: the nearest to the agent."""
 
     def order(node: Object) -> tuple[float, str]:
         return math.dist((node.x_m, node.y_m), agent_m), node.id
@@ -54,8 +54,8 @@ def cues(learned: Iterable[Object], agent_m: tuple[float, float]) -> list[Object
 def recalled(
     here: Sequence[Object], way: Way, stored: Sequence[RememberedMap], cell_m: float
 ) -> Recalled | None:
-    """The one of some stored maps that objects `here`, at the end of a way, are on; None if that is
-    not sure.
+    """Find the one of some stored maps that objects `here`, at the end of a way, are on; None if
+    that is not sure.
     """
     if len(here) < MIN_MATCHES:
         return None

@@ -11,7 +11,7 @@ from cogmap.services.memory.storing import COLUMNS
 
 
 def recollection(found: Recalled) -> Recollection:
-    """The node that a recalled map is offered as."""
+    """Make the node as which a recalled map is offered."""
     remembered = found.remembered
     assert remembered.known is not None
     x_m, y_m, heading_rad = found.pose.tolist()

@@ -49,7 +49,7 @@ class Way(NamedTuple):
 
 
 def way_of(graph: Graph, learned: Sequence[Object]) -> Way:
-    """The agent's way, as far back as the last segments of its path."""
+    """Return the agent's way, as far back as the last segments of its path."""
     rows = [np.zeros((0, len(PathColumn)))]
     for segment in graph.path[-SEGMENTS:]:
         rows.append(np.asarray(segment.rows.numpy(), np.float64))
@@ -58,8 +58,8 @@ def way_of(graph: Graph, learned: Sequence[Object]) -> Way:
 
 
 def is_as_passed(way: Way, remembered: RememberedMap, pose: Floats) -> bool:
-    """Whether enough objects of a stored map are along the way, and enough of them are known here,
-    the frame here having that `pose` in the map's.
+    """Decide whether enough objects of a stored map are along the way, and enough of them are known
+    here. The frame here has that `pose` in the map's.
     """
     along = _along(transform_from(pose, way.at_m), remembered.at_m)
     if len(along) < MIN_PASSED:
@@ -79,7 +79,7 @@ def is_as_passed(way: Way, remembered: RememberedMap, pose: Floats) -> bool:
 
 
 def _along(way_m: Floats, at_m: Floats) -> Indices:
-    """(m,): the numbers of the objects, (n, 2), that were passed on a way, (k, 2)."""
+    """Find the numbers of the objects, (n, 2), that were passed on a way, (k, 2); (m,)."""
     if len(way_m) < 2:
         return np.zeros(0, np.int64)
 

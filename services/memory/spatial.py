@@ -45,11 +45,11 @@ class SpatialMemory:
 
     @property
     def name(self) -> str:
-        """What the root map was stored as; empty before it is."""
+        """Return the name under which the root map was stored; empty before it is."""
         return self._name
 
     def restore(self, records: Iterable[StoredRecord]) -> None:
-        """Know the maps that the database holds."""
+        """Take up the maps that the database holds."""
         self._maps.put(records)
         self._cued = set()
         self._associations = None
@@ -63,7 +63,7 @@ class SpatialMemory:
                     self._name = record.map
 
     def learned(self) -> list[StoredRecord]:
-        """What stands for all that was stored in this run: the map without its places."""
+        """Return what stands for all that was stored in this run: the map without its places."""
         remembered = self._maps.get(self._name)
         if remembered is None:
             return []
@@ -81,11 +81,11 @@ class SpatialMemory:
         self._forgotten.note_all(None if remembered is None else remembered.known)
 
     def on_broadcast(self, broadcast: Broadcast) -> None:
-        """What is conscious cues what stood near it."""
+        """Let what is conscious cue what stood near it."""
         self._cues.on_broadcast(broadcast)
 
     def changes(self) -> Changes:
-        """What has changed on the root map since it was stored."""
+        """Return what has changed on the root map since it was stored."""
         forgotten = self._rename()
         records: list[StoredRecord] = [*self._changed.take(self._name, self._graph)]
         learned = self._learned()
@@ -104,7 +104,7 @@ class SpatialMemory:
         return Changes(records, forgotten)
 
     def recall(self) -> Recollection | None:
-        """The stored map that the agent is on, where other objects than before show that now."""
+        """Recall the stored map that the agent is on, if other objects than before show it now."""
         agent = self._graph.agent
         if agent is None or self._joined or RECOLLECTION_ID in self._graph.nodes:
             return None
@@ -122,13 +122,13 @@ class SpatialMemory:
         return None if found is None else recollection(found)
 
     def returning(self, cycle: int) -> list[Object]:
-        """The objects that were forgotten and come back, cued by what was conscious before `cycle`
+        """Return the forgotten objects that come back, cued by what was conscious before `cycle`
         and by where the agent is.
         """
         return self._cues.cued(cycle, self._forgotten.known)
 
     def _compared(self, here: list[Object]) -> list[RememberedMap]:
-        """The stored maps to compare: all, or of many those that objects `here` remind of."""
+        """Choose the stored maps to compare: all, or if many, those that `here` reminds of."""
         others = self._maps.others(self._name)
         if len(others) <= self._config.compared_maps:
             return others
@@ -144,8 +144,8 @@ class SpatialMemory:
         return [remembered for remembered in others if remembered.name in names]
 
     def _rename(self) -> list[str]:
-        """Call the root map what it has turned out to be, or give it a name where it has none. The
-        keys of the records under a name that no longer holds.
+        """Call the root map what it has turned out to be, or give it a name if it has none. Return
+        the keys of the records under a name that no longer holds.
         """
         before = self._name
         self._name = self._joined or before or self._maps.next_name()
@@ -157,12 +157,12 @@ class SpatialMemory:
 
     @property
     def _joined(self) -> str:
-        """The name of the map that was joined to the root map; empty if none was."""
+        """Return the name of the map that was joined to the root map; empty if none was."""
         root = self._graph.get(Map, ROOT_MAP)
         return "" if root is None else root.remembered
 
     def _learned(self) -> list[Object]:
-        """The objects of the root map that were seen often enough to be learned."""
+        """Return the objects of the root map that were seen often enough to be learned."""
         learned = []
         for node in self._graph.of_kind(Object):
             if node.map == ROOT_MAP and node.sightings >= MIN_SIGHTINGS:

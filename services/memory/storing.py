@@ -59,7 +59,7 @@ class ChangedPlaces:
             self._changed.add((x, y))
 
     def take(self, name: str, graph: Graph) -> list[StoredTile]:
-        """The records of the squares that have changed, of the map that is called `name`."""
+        """Take the records of the squares that have changed, of the map that is called `name`."""
         records = []
         for x, y in sorted(self._changed):
             tile = graph.places.tiles.get((ROOT_MAP, x, y))
@@ -78,7 +78,7 @@ class ChangedPlaces:
 
 
 def stored_objects(name: str, objects: Iterable[Object], graph: Graph) -> list[StoredRecord]:
-    """The record of the objects of the map that is called `name`; none if there are none."""
+    """Make the record of the objects of the map that is called `name`; none if there are none."""
     known = sorted(objects, key=lambda node: node.id)
     if not known:
         return []
@@ -107,8 +107,8 @@ def stored_objects(name: str, objects: Iterable[Object], graph: Graph) -> list[S
 
 
 def stored_tree(name: str, objects: Iterable[Object], graph: Graph) -> list[StoredRecord]:
-    """The record of the sub-maps that have some of the objects of the map that is called `name`;
-    none if there are none.
+    """Make the record of the sub-maps that have some of the objects of the map that is called
+    `name`; none if there are none.
     """
     members: dict[str, list[str]] = {}
     for label in sorted(node.label for node in objects):

@@ -28,17 +28,17 @@ class Aim(NamedTuple):
 
 
 def bearing_of(x_m: float, y_m: float, pose: Pose) -> float:
-    """The bearing of a position as seen from a pose, in rad, left positive."""
+    """Compute the bearing of a position as seen from a pose, in rad, left positive."""
     direction_rad = math.atan2(y_m - pose.y_m, x_m - pose.x_m)
     return math.remainder(direction_rad - pose.heading_rad, math.tau)
 
 
 def slowest(*speeds: Speed) -> Speed:
-    """The lowest of speeds, of equals the first."""
+    """Return the lowest of speeds, of equals the first."""
     return min(speeds, key=lambda speed: speed.m_s)
 
 
 def in_bend(curvature_per_m: float, config: Config) -> Speed:
-    """The highest speed on an arc of that curvature, to either side."""
+    """Compute the highest speed on an arc of that curvature, to either side."""
     bend_per_m = max(abs(curvature_per_m), 1e-6)
     return Speed(math.sqrt(config.lateral_m_s2 / bend_per_m), SpeedLimit.BEND)

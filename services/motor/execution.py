@@ -32,7 +32,7 @@ class Execution:
 
     @property
     def executed(self) -> MotorProgram:
-        """The program that was started last. Raises MessageError if none was."""
+        """Return the program that was started last. Raises MessageError if none was."""
         if self._executed is None:
             raise MessageError("no motor program was started yet")
         return self._executed
@@ -52,8 +52,8 @@ class Execution:
         self._actions.append(action)
 
     def started(self, answered_cycle: int, waiting_cycle: int | None) -> list[MotorProgram]:
-        """The programs that start now, after the command of `answered_cycle`, with a pose of
-        `waiting_cycle` to answer next, None if none has come.
+        """Start the programs that are due after the command of `answered_cycle`, and return them.
+        The pose to answer next is of `waiting_cycle`, None if none has come.
         """
         started = []
         waiting = []
@@ -68,11 +68,11 @@ class Execution:
         return started
 
     def take(self, plan: Plan | None, agent: Pose | Self | None) -> None:
-        """The plan is this one now, where it is new."""
+        """Take this plan as the current one, if it is new."""
         self._follow.take(plan, agent)
 
     def aim(self, stamp_ns: int, pose: Pose) -> Aim | SpeedLimit:
-        """Where the program steers to from the pose at a time, or why it halts."""
+        """Return where the program steers to from the pose at a time, or why it halts."""
         self._track.put(stamp_ns, pose)
         return self._program.aim(pose)
 

@@ -18,25 +18,25 @@ class LockstepGate:
         self._unanswered: set[int] = set()
 
     def on_competition(self, competition: Competition) -> None:
-        """The global workspace has come so far."""
+        """Note how far the global workspace has come."""
         self._competition_cycle = competition.cycle
         if competition.trigger and competition.cycle > self._action_cycle:
             self._unanswered.add(competition.cycle)
 
     def on_action(self, cycle: int) -> None:
-        """What was selected for the broadcast of `cycle` has come."""
+        """Note that what was selected for the broadcast of `cycle` has come."""
         self._action_cycle = cycle
         self._unanswered = {each for each in self._unanswered if each > cycle}
 
     def resume(self, cycle: int) -> None:
-        """At `cycle`, after a restart, or where something was lost: wait for nothing that was
+        """Go on at `cycle`, after a restart, or if something was lost: wait for nothing that was
         published before.
         """
         self._competition_cycle = max(self._competition_cycle, cycle - 1)
         self._unanswered = {each for each in self._unanswered if each >= cycle}
 
     def is_open(self, stamp_ns: int, cycle: int) -> bool:
-        """Whether the command for the pose of `stamp_ns` in `cycle` may be computed."""
+        """Decide whether the command for the pose of `stamp_ns` in `cycle` may be computed."""
         has_senses = min(self.scan_ns, self.motion_ns) >= stamp_ns
         has_competition = self._competition_cycle >= cycle - 1
         has_action = not any(each < cycle for each in self._unanswered)

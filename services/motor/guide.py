@@ -29,13 +29,13 @@ class Track:
         self._poses: dict[int, Pose] = {}
 
     def put(self, stamp_ns: int, pose: Pose) -> None:
-        """The agent is there now."""
+        """Note where the agent is at a time."""
         self._poses[stamp_ns] = pose
         while len(self._poses) > TRACKED_POSES:
             del self._poses[min(self._poses)]
 
     def at(self, stamp_ns: int) -> Pose | None:
-        """The pose at a time; None if that is not known."""
+        """Return the pose at a time; None if that is not known."""
         return self._poses.get(stamp_ns)
 
 
@@ -62,15 +62,15 @@ class Guide:
         self._is_short = distances_along(self._places_m)[-1] <= SHORT_M
 
     def continue_from(self, before: Guide) -> None:
-        """This program corrects another, by a share of what lies between their paths: what is seen
-        is uncertain, and what was seen before counts too.
+        """Correct another program, by a share of what lies between their paths: what is seen is
+        uncertain, and what was seen before counts too.
         """
         route = before._route or before._before
         if route is not None and route.left_m > END_M:
             self._before = route
 
     def aim(self, pose: Pose) -> Aim | SpeedLimit:
-        """The point of the path that pure pursuit steers to, until the path ends."""
+        """Aim at the point of the path that pure pursuit steers to, until the path ends."""
         if self._is_short:
             return SpeedLimit.NO_ACTION
         if self._route is None:
@@ -80,7 +80,7 @@ class Guide:
         return SpeedLimit.NO_ACTION if self._route.left_m <= END_M else aim
 
     def _route_at(self, pose: Pose) -> Route:
-        """The path, as it is to be driven from a pose on."""
+        """Make the path, as it is to be driven from a pose on."""
         seen = self._track.at(self._seen_ns) or pose
         frame = np.array([seen.x_m, seen.y_m, seen.heading_rad])
         places_m = transform_from(frame, self._places_m)
@@ -98,8 +98,8 @@ class Guide:
 
 
 def between(before: Floats, now: Floats, share: float) -> Floats:
-    """(3,): the pose `now`, moved aside and turned towards `before` but for a share of what lies
-    between them; `now` itself if they lead elsewhere.
+    """Move the pose `now`, (3,), aside and turn it towards `before`, so that `share` of what lies
+    between them is left; return `now` itself if they lead elsewhere.
     """
     turn_rad = math.remainder(float(before[2] - now[2]), math.tau)
     if abs(turn_rad) > TURNED_RAD:

@@ -77,7 +77,7 @@ class MotorModule:
                 self._is_resumed = True
 
     def executed(self) -> MotorProgram:
-        """The program that is executed. Raises MessageError if none was yet."""
+        """Return the program that is executed. Raises MessageError if none was yet."""
         return self._execution.executed
 
     def on_clock(self, clock: Clock) -> MotorCommand | None:
@@ -107,7 +107,7 @@ class MotorModule:
         """Measure how far it is free ahead.
 
         In lockstep a repeated scan is answered at once: by the command for the pose that waits, or
-        by a halt where no pose has come since a restart.
+        by a halt if no pose has come since a restart.
         """
         self._clear_m = obstacle_ahead_m(scan)
         is_repeated = scan.stamp_ns == self._gate.scan_ns
@@ -153,7 +153,7 @@ class MotorModule:
         self._execution.take(self._graph.get(Plan, PLAN_ID), self._graph.agent)
 
     def on_competition(self, competition: Competition) -> list[Message]:
-        """A cycle's competition has ended."""
+        """Note that a cycle's competition has ended."""
         self._gate.on_competition(competition)
         return self._replies()
 
@@ -170,7 +170,7 @@ class MotorModule:
         return self._replies()
 
     def _replies(self, at_once: bool = False) -> list[Message]:
-        """The programs that start, and the command for the newest pose."""
+        """Return the programs that start, and the command for the newest pose."""
         replies: list[Message] = [*self._programs()]
         command = self._command(at_once)
         if command is not None:
@@ -178,7 +178,7 @@ class MotorModule:
         return replies
 
     def _programs(self) -> list[MotorProgram]:
-        """The programs that start; what they seek is offered with the next command."""
+        """Start the programs that are due; what they seek is offered with the next command."""
         waiting_cycle = None if self._waiting is None else self._waiting.cycle
         started = self._execution.started(self._answered_cycle, waiting_cycle)
         for program in started:
@@ -189,8 +189,8 @@ class MotorModule:
         return started
 
     def _offers(self, command: MotorCommand) -> list[Message]:
-        """The goal that is sought, where the agent has none of that name that can be reached; in
-        lockstep, where the next cycle waits for an offer, perhaps none.
+        """Offer the goal that is sought, if the agent has none of that name that can be reached; in
+        lockstep, where the next cycle waits for an offer, perhaps offer nothing.
         """
         goal = self._sought
         self._sought = None
@@ -207,7 +207,7 @@ class MotorModule:
         return [Offer(stamp_ns=command.stamp_ns, cycle=cycle, operations=operations)]
 
     def _command(self, at_once: bool = False) -> MotorCommand | None:
-        """The command for the newest pose, if there is one that waits for nothing any longer."""
+        """Make the command for the newest pose, if one is there and waits for nothing more."""
         estimate = self._waiting
         if estimate is None:
             return None
@@ -239,12 +239,12 @@ class MotorModule:
         return command
 
     def _age_ns(self, stamp_ns: int) -> int:
-        """How much older than the newest message a stamp is; 0 in lockstep, where time waits."""
+        """Compute a stamp's age by the newest message; 0 in lockstep, where time waits."""
         return 0 if self._is_lockstep else max(0, self._newest_ns - stamp_ns)
 
 
 def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
-    """The module `motor`."""
+    """Build the module `motor`."""
     graph = Graph(with_places=False)
     motor = MotorModule(config, graph, run)
     replies = (topics.MOTOR_PROGRAM, topics.MOTOR_COMMAND, topics.OFFER)

@@ -23,7 +23,7 @@ TURN_TIME_S = 0.5
 
 
 def obstacle_ahead_m(scan: RangeScan) -> float:
-    """Distance of the nearest obstacle in the robot's lane, infinite without one.
+    """Measure the distance of the nearest obstacle in the robot's lane, infinite without one.
 
     It is that of the second nearest sector, as one sector alone may be noise. Raises MessageError
     if bearings and ranges do not pair.
@@ -45,7 +45,7 @@ def obstacle_ahead_m(scan: RangeScan) -> float:
 
 
 def halted(stamp_ns: int, reason: SpeedLimit, pose_age_ns: int = 0) -> MotorCommand:
-    """A command that stops the wheels."""
+    """Make a command that stops the wheels."""
     return MotorCommand(
         stamp_ns=stamp_ns,
         left_wheel_rad_s=0.0,
@@ -67,8 +67,8 @@ class SensoryMotorMemory:
     def command(
         self, stamp_ns: int, aim: Aim, clear_m: float, pose_age_ns: int = 0
     ) -> MotorCommand:
-        """Wheel speeds towards `aim`, by a pose that is `pose_age_ns` old, with `clear_m` free
-        ahead.
+        """Compute wheel speeds towards `aim`, by a pose that is `pose_age_ns` old, with `clear_m`
+        free ahead.
 
         If the aim is behind, or aside of an obstacle, the robot turns on the spot.
         """
@@ -106,7 +106,7 @@ class SensoryMotorMemory:
         return _wheels(stamp_ns, left_m_s, right_m_s, speed.limit, pose_age_ns)
 
     def _speed_by_age(self, age_s: float) -> float:
-        """The speed that covers `blind_m` within the pose's age, 0 beyond `max_pose_age_s`."""
+        """Return the speed that covers `blind_m` in the pose's age, 0 beyond `max_pose_age_s`."""
         if age_s <= 0.0:
             return math.inf
         if age_s > self._config.max_pose_age_s:

@@ -11,7 +11,7 @@ Parameters = Mapping[str, Scalar]
 
 
 def number(parameters: Parameters, name: str) -> float:
-    """A parameter that is a number. Raises MessageError if it is none."""
+    """Return a parameter that is a number. Raises MessageError if it is none."""
     value = parameters.get(name)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise MessageError(f"motor program: parameter {name!r} is {value!r}, not a number")
@@ -19,7 +19,7 @@ def number(parameters: Parameters, name: str) -> float:
 
 
 def stamp(parameters: Parameters, name: str) -> int:
-    """A parameter that is a time in ns. Raises MessageError if it is none."""
+    """Return a parameter that is a time in ns. Raises MessageError if it is none."""
     value = parameters.get(name)
     if isinstance(value, bool) or not isinstance(value, int):
         raise MessageError(f"motor program: parameter {name!r} is {value!r}, not a time in ns")
@@ -27,7 +27,7 @@ def stamp(parameters: Parameters, name: str) -> int:
 
 
 def word(parameters: Parameters, name: str) -> str:
-    """A parameter that is a word. Raises MessageError if it is none."""
+    """Return a parameter that is a word. Raises MessageError if it is none."""
     value = parameters.get(name)
     if not isinstance(value, str) or not value:
         raise MessageError(f"motor program: parameter {name!r} is {value!r}, not a word")

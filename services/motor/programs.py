@@ -27,7 +27,7 @@ class Program(Protocol):
     """A motor program in execution."""
 
     def aim(self, pose: Pose) -> Aim | SpeedLimit:
-        """Where to steer to from a pose, or why to halt."""
+        """Return where to steer to from a pose, or why to halt."""
 
 
 class FollowPlan:
@@ -60,7 +60,7 @@ class FollowPlan:
             self._route.join(agent.x_m, agent.y_m)
 
     def aim(self, pose: Pose) -> Aim | SpeedLimit:
-        """The point of the route that pure pursuit steers to."""
+        """Aim at the point of the route that pure pursuit steers to."""
         route = self._route
         if route is None:
             return self._without_route
@@ -75,7 +75,7 @@ class Halt:
         self._follow = follow
 
     def aim(self, pose: Pose) -> Aim | SpeedLimit:
-        """Why to halt."""
+        """Return why to halt."""
         aim = self._follow.aim(pose)
         return SpeedLimit.NO_ACTION if isinstance(aim, Aim) else aim
 
@@ -89,7 +89,7 @@ class Turn:
         self._is_complete = False
 
     def aim(self, pose: Pose) -> Aim | SpeedLimit:
-        """The direction that is left to turn to, a half turn at a time."""
+        """Aim in the direction that is left to turn to, a half turn at a time."""
         if self._heading_rad is not None:
             self._left_rad -= math.remainder(pose.heading_rad - self._heading_rad, math.tau)
         self._heading_rad = pose.heading_rad
@@ -110,7 +110,7 @@ class Dock:
         self._is_docked = False
 
     def aim(self, pose: Pose) -> Aim | SpeedLimit:
-        """The target, until it is reached."""
+        """Aim at the target, until it is reached."""
         away_m = math.hypot(self._x_m - pose.x_m, self._y_m - pose.y_m)
         self._is_docked |= away_m <= DOCKED_M
         if self._is_docked:
@@ -123,7 +123,7 @@ class Dock:
 def program_of(
     action: str, parameters: Parameters, follow: FollowPlan, config: Config, track: Track
 ) -> Program:
-    """The motor program of an action. Raises MessageError if it has none, or lacks a parameter."""
+    """Make an action's motor program. Raises MessageError if it has none, or lacks a parameter."""
     match action:
         case ActionName.FOLLOW_PLAN:
             return follow
@@ -141,7 +141,7 @@ def program_of(
 
 
 def sought_by(program: MotorProgram) -> Goal | None:
-    """The goal that a motor program gives the agent; None if it is not one that seeks.
+    """Return the goal that a motor program gives the agent; None if it is not one that seeks.
 
     Raises MessageError if it lacks a parameter.
     """

@@ -38,12 +38,12 @@ class Route:
 
     @property
     def travelled_m(self) -> float:
-        """Distance along the line from its start to the agent."""
+        """Return the distance along the line from its start to the agent."""
         return self._index * STEP_M
 
     @property
     def left_m(self) -> float:
-        """Distance along the line from the agent to its end."""
+        """Return the distance along the line from the agent to its end."""
         return (self._last - self._index) * STEP_M
 
     def advance(self, x_m: float, y_m: float) -> None:
@@ -58,14 +58,14 @@ class Route:
 
     @property
     def pose(self) -> Floats:
-        """(3,): the point of the line where the agent is, and the direction there."""
+        """Return the point of the line where the agent is, and the direction there, (3,)."""
         first = max(0, min(self._index, self._last - 1))
         ahead_x_m, ahead_y_m = (self.points_m[first + 1] - self.points_m[first]).tolist()
         x_m, y_m = self.points_m[self._index].tolist()
         return np.array([x_m, y_m, math.atan2(ahead_y_m, ahead_x_m)])
 
     def ahead(self, distance_m: float) -> tuple[float, float]:
-        """The point of the line `distance_m` ahead of the agent, at most its end."""
+        """Return the point of the line `distance_m` ahead of the agent, at most its end."""
         steps = round(distance_m / STEP_M)
         index = min(self._index + steps, self._last)
 
@@ -73,7 +73,7 @@ class Route:
         return x_m, y_m
 
     def sharpest(self, distance_m: float) -> float:
-        """The sharpest curvature within `distance_m` ahead, per metre."""
+        """Find the sharpest curvature within `distance_m` ahead, per metre."""
         last = self._index + round(distance_m / STEP_M)
         window_per_m = self.curvature_per_m[self._index : last + 1]
 
@@ -81,8 +81,8 @@ class Route:
 
 
 def pursuit(route: Route, pose: Pose, config: Config) -> Aim:
-    """The point of a route that pure pursuit steers to from a pose, at the highest speed that the
-    bend ahead and the end of the route allow.
+    """Aim at the point of a route that pure pursuit steers to from a pose, at the highest speed
+    that the bend ahead and the end of the route allow.
     """
     route.advance(pose.x_m, pose.y_m)
     x_m, y_m = route.ahead(LOOKAHEAD_M)
@@ -101,13 +101,13 @@ def pursuit(route: Route, pose: Pose, config: Config) -> Aim:
 
 
 def _nearest(points_m: Floats, x_m: float, y_m: float) -> int:
-    """The index of that of (n, 2) points which is nearest to a position, the first of several."""
+    """Find the index of the one of (n, 2) points nearest to a position, the first of several."""
     away_m = np.hypot(*(points_m - (x_m, y_m)).T)
     return int(away_m.argmin())
 
 
 def _smoothed(points_m: Floats) -> Floats:
-    """The line of (n, 2) points, each the mean of those within SMOOTHED_M / 2, its ends kept."""
+    """Smooth a line of (n, 2) points: average those within SMOOTHED_M / 2, but keep its ends."""
     reach = round(SMOOTHED_M / 2 / STEP_M)
     padded = np.pad(points_m, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
 

@@ -15,12 +15,12 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     schemes: Annotated[
         str,
         msgspec.Meta(
-            description="TOML file of schemes, in the place of the built-in ones; empty: those"
+            description="TOML file of schemes, in the place of the built-in ones; empty: those."
         ),
     ] = ""
     instantiation: Annotated[
         Share,
-        msgspec.Meta(description="Activation at which a scheme becomes a behaviour that competes"),
+        msgspec.Meta(description="Activation at which a scheme becomes a behaviour that competes."),
     ] = 0.1
     unconscious_share: Annotated[
         Share,
@@ -36,7 +36,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             ge=1,
             le=1000,
-            description="Guidance schemes that are kept of those learned; the oldest are forgotten",
+            description="Guidance schemes that are kept of those learned; the oldest are "
+            "forgotten.",
         ),
     ] = 1000
     graph_kinds: Annotated[

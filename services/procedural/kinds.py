@@ -44,26 +44,26 @@ class NodeKinds:
 
     @property
     def names(self) -> list[str]:
-        """Every kind."""
+        """Return every kind."""
         return sorted(self._types)
 
     def fields(self, kind: str) -> list[str] | None:
-        """The fields of a kind; None if it may have any."""
+        """Return the fields of a kind; None if it may have any."""
         if self._types[kind] is Node:
             return None
         return [field.encode_name for field in msgspec.structs.fields(self._types[kind])]
 
     def known(self, meaning: str) -> list[str]:
-        """The words that there are for NEED or FUNCTION."""
+        """Return the words that there are for NEED or FUNCTION."""
         return self._known[meaning]
 
     def meaning(self, kind: str, field: str) -> str:
-        """What the words of a field stand for, NEED or FUNCTION; empty if they may be any."""
+        """Return what the words of a field mean, NEED or FUNCTION; empty if they may be any."""
         return _MEANING.get((kind, field), "")
 
     def scalar(self, kind: str, field: str) -> type | None:
-        """The type of a field, of an enumeration that of its values; None if it is no scalar, or
-        may be any.
+        """Return the type of a field, of an enumeration that of its values; None if it is no
+        scalar, or may be any.
         """
         if self.fields(kind) is None:
             return None
@@ -72,7 +72,7 @@ class NodeKinds:
         return _SCALARS.get(type(found))
 
     def value(self, kind: str, field: str, value: Any) -> Scalar:
-        """A value of a field, of its type: of an enumeration also by the name of a member.
+        """Convert a value to the type of its field: of an enumeration also the name of a member.
 
         Raises ValueError if it is no such value.
         """

@@ -52,7 +52,7 @@ class Reliability:
                 self._records[behaviour.scheme] = record
 
     def on_action(self, action: Action) -> None:
-        """A scheme is executed from now on."""
+        """Note that a scheme is executed from now on."""
         if not action.scheme:
             return
 
@@ -69,7 +69,7 @@ class Reliability:
             self._running = Execution(scheme, bindings, until_ns)
 
     def judge(self, nodes: Sequence[Active], stamp_ns: int) -> None:
-        """Whether the results of what is executed have come true in the situation of a time."""
+        """Judge whether what is executed has had its results, in the situation of a time."""
         running = self._running
         if running is None:
             return
@@ -84,7 +84,7 @@ class Reliability:
         self._running = None
 
     def noted(self, behaviour: Behaviour) -> Behaviour:
-        """A behaviour with the reliability of its scheme."""
+        """Return a behaviour with the reliability of its scheme."""
         record = self._records[behaviour.scheme]
         reliability = self._schemes[behaviour.scheme].base_level
         if record.executions:

@@ -73,8 +73,8 @@ class SchemeFile(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
 
 
 def load(path: Path) -> list[Scheme]:
-    """The schemes of a file. Raises ConfigError that names the file, and the line of what is wrong
-    in it.
+    """Load the schemes of a file. Raises ConfigError that names the file, and the line of what is
+    wrong in it.
     """
     source, file = _decoded(path)
     kinds = NodeKinds(file.generic_kinds, file.own_needs, file.own_functions)
@@ -90,7 +90,7 @@ def load(path: Path) -> list[Scheme]:
 
 
 def load_guidance(path: Path) -> list[GuidanceScheme]:
-    """The guidance schemes of a file. Raises ConfigError as `load` does."""
+    """Load the guidance schemes of a file. Raises ConfigError as `load` does."""
     source, file = _decoded(path)
     names = {table.name for table in file.scheme}
     schemes = []
@@ -132,7 +132,7 @@ def _decoded(path: Path) -> tuple[Source, SchemeFile]:
 
 
 def _located(source: Source, error: str) -> ConfigError:
-    """An error of the decoder, which names where it is by a path such as $.scheme[1].name."""
+    """Locate an error of the decoder, which names its place by a path such as $.scheme[1].name."""
     place = re.search(r"\$\.(\w+)\[(\d+)\]", error)
     words = re.findall(r"\w+", error.rpartition("$")[2]) or [""]
     unknown = re.search(r"unknown field `(\w+)`", error)
@@ -154,7 +154,7 @@ class _Reader:
         self._near: list[str] = []
 
     def scheme(self, actions: Sequence[str]) -> Scheme:
-        """The scheme, whose action is one of `actions`. Raises ConfigError."""
+        """Read the scheme, whose action is one of `actions`. Raises ConfigError."""
         table = self._table
         if not table.context:
             raise self._error("context", "has no context: name a pattern at least")
@@ -185,7 +185,7 @@ class _Reader:
         return Result(self._bound(pattern), float(salience))
 
     def _bound(self, pattern: Pattern) -> Pattern:
-        """A result whose variable, if it has one, is one of the context."""
+        """Check a result: no feeling, and its variable, if it has one, is one of the context."""
         if pattern.feelings:
             text = "has a feeling among its results: it is a condition of the context alone"
             raise self._error(FEELING, text)
@@ -244,7 +244,7 @@ class _Reader:
             raise self._unknown(meaning, str(word), self._kinds.known(meaning))
 
     def _parameters(self) -> dict[str, Scalar | Reference]:
-        """The parameters, which are those of the motor program, where that is one of ours."""
+        """Read the parameters, which are those of the motor program, if that is one of ours."""
         action = self._table.action
         given = self._table.parameters
         parameters = {name: self._parameter(name, value) for name, value in given.items()}
@@ -285,7 +285,7 @@ class _Reader:
             raise self._error(name, text)
 
     def _parameter(self, name: str, value: Scalar) -> Scalar | Reference:
-        """A parameter as it is, or "$VARIABLE.FIELD" of a node of the context."""
+        """Read a parameter as it is, or "$VARIABLE.FIELD" of a node of the context."""
         self._near = [name]
         if not isinstance(value, str) or not value.startswith("$"):
             return value

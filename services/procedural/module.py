@@ -62,7 +62,7 @@ class ProceduralMemory:
             self._resumed_cycle = self._last.cycle
 
     def last(self) -> Behaviours:
-        """What was published last, with all that was learned before. Raises MessageError where
+        """Return what was published last, with all that was learned before. Raises MessageError if
         nothing was.
         """
         if self._last is None:
@@ -70,12 +70,12 @@ class ProceduralMemory:
         return replace(self._last, learned=self._guidance.kept)
 
     def on_delta(self, delta: Delta) -> list[Behaviours]:
-        """The graph has changed."""
+        """Note that the graph has changed."""
         self._situations.on_graph(self._graph, delta.phase)
         return self._due()
 
     def on_load(self) -> list[Behaviours]:
-        """The graph was loaded as a whole."""
+        """Note that the graph was loaded as a whole."""
         self._situations.on_load(self._graph)
         return self._due()
 
@@ -91,7 +91,7 @@ class ProceduralMemory:
         return self._due()
 
     def on_action(self, action: Action) -> list[Behaviours]:
-        """A scheme is executed, or none was active enough."""
+        """Note that a scheme is executed, or that none was active enough."""
         self._reliability.on_action(action)
         self._guidance.on_action(action)
         if self._unanswered_cycle is not None and action.cycle >= self._unanswered_cycle:
@@ -133,7 +133,7 @@ class ProceduralMemory:
 
 
 def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
-    """The module `procedural`. Raises ConfigError if its schemes cannot be used."""
+    """Build the module `procedural`. Raises ConfigError if its schemes cannot be used."""
     graph = Graph(with_places=False)
     memory = ProceduralMemory(config, graph, run)
     published = [topics.BEHAVIOURS]

@@ -34,7 +34,7 @@ class Condition:
     at_most: float | None = None
 
     def holds(self, node: GraphNode) -> bool:
-        """Whether it is so of a node. Of one without the field it is not."""
+        """Decide whether a node fulfils the condition. A node without the field does not."""
         value = value_of(node, self.field)
         if value is None:
             return False
@@ -75,7 +75,7 @@ class Pattern:
     feelings: tuple[Feeling, ...] = ()
 
     def match(self, nodes: Iterable[Active], bindings: Bindings) -> Active | None:
-        """The most active node that matches, of equals the first by id; None if none does."""
+        """Find the most active node that matches, of equals the first by id; None if none does."""
         wanted = bindings.get(self.variable)
         found = []
         for active in nodes:
@@ -90,7 +90,7 @@ class Pattern:
         return min(found, key=lambda each: (-each.activation, each.node.id), default=None)
 
     def spelled(self, bindings: Bindings) -> str:
-        """The pattern in words, with the id of the node that its variable stands for."""
+        """Spell the pattern in words, with the id of the node that its variable stands for."""
         words = [self.kind]
         bound = bindings.get(self.variable)
         if bound is not None:
@@ -102,8 +102,8 @@ class Pattern:
 
 
 def value_of(node: GraphNode, field: str) -> Scalar | None:
-    """A field of a node, or an attribute of a node of a kind that is not known here; None where it
-    has none that is a scalar.
+    """Return a field of a node, or an attribute of a node of a kind that is not known here; None if
+    it has none that is a scalar.
     """
     if isinstance(node, Node) and field in node.attributes:
         return node.attributes[field]

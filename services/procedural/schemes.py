@@ -46,8 +46,8 @@ class Scheme:
     within_s: float = 5.0
 
     def activation(self, context: Sequence[float]) -> float:
-        """min(1, mean context + mean |adding-list salience|), 0 where part of the context is not
-        active.
+        """Compute min(1, mean context + mean |adding-list salience|), 0 if part of the context is
+        not active.
         """
         if not context or min(context) <= 0.0:
             return 0.0
@@ -58,8 +58,8 @@ class Scheme:
         return min(1.0, mean_context + mean_adding)
 
     def considered(self, nodes: Sequence[Active], threshold: float) -> Behaviour:
-        """The behaviour that nodes make of the scheme, rejected if part of its context is missing
-        or it is less active than `threshold`.
+        """Make the behaviour that nodes make of the scheme, rejected if part of its context is
+        missing or it is less active than `threshold`.
         """
         # Each pattern takes the most active node that is left to it by the variables before.
         bindings: dict[str, str] = {}
@@ -102,5 +102,5 @@ class Scheme:
         )
 
     def has_come_true(self, nodes: Sequence[Active], bindings: Mapping[str, str]) -> bool:
-        """Whether all that the action was expected to bring about is there."""
+        """Decide whether all that the action was expected to bring about is there."""
         return all(result.pattern.match(nodes, bindings) for result in self.adding)

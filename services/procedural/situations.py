@@ -40,13 +40,13 @@ class Situations:
         self._nodes: dict[int, tuple[Active, ...]] = {}
 
     def on_load(self, graph: Graph) -> None:
-        """The graph was replaced as a whole: it may be that of another run."""
+        """Start anew: the graph was replaced as a whole, and may be that of another run."""
         self._nodes.clear()
         self._cycle = 0
         self.on_graph(graph, graph.phase)
 
     def on_graph(self, graph: Graph, phase: Phase) -> None:
-        """The graph is now as after this phase of its cycle."""
+        """Note that the graph is now as after this phase of its cycle."""
         if graph.cycle != self._cycle:
             self._cycle = graph.cycle
             self._is_settled = False
@@ -65,11 +65,11 @@ class Situations:
             del self._nodes[min(self._nodes)]
 
     def is_settled(self, cycle: int) -> bool:
-        """Whether the pose of a cycle is committed, or that of a later one."""
+        """Decide whether the pose of a cycle is committed, or that of a later one."""
         return self._cycle > cycle or (self._cycle == cycle and self._is_settled)
 
     def of(self, broadcast: Broadcast) -> tuple[Active, ...]:
-        """The nodes of a broadcast, and those of its cycle that it has not."""
+        """Return the nodes of a broadcast, and those of its cycle that it has not."""
         nodes = []
         for node in broadcast.coalition.nodes:
             activation = min(1.0, node.base_level + node.activation)

@@ -40,8 +40,8 @@ class Source:
         near: Iterable[str] = (),
         table: str = SCHEME,
     ) -> ConfigError:
-        """An error about a word in the scheme of that number, from 0, among those of a table of
-        TOML; None if it is in none.
+        """Make an error about a word in the scheme of that number, from 0, among those of a table
+        of TOML; `scheme` is None if the word is in none.
         """
         bounds = [*self._headers, len(self._lines)]
         headers = self._of_table.get(table, [])
@@ -63,6 +63,6 @@ class Source:
         return ConfigError(f"{self._path}:{number + 1}: {text}")
 
     def _has(self, number: int, word: str) -> bool:
-        """Whether a line has a word, outside comments."""
+        """Decide whether a line has a word, outside comments."""
         code = self._lines[number].partition("#")[0]
         return re.search(rf"(?<![\w-]){re.escape(word)}(?![\w-])", code) is not None

@@ -130,7 +130,7 @@ class _Pair(NamedTuple):
 
 
 def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> tuple[Floats, Booleans]:
-    """The positions (n, 2) of the new view's corners in the last one, and which were found (n,)."""
+    """Find where the new view's corners were in the last one, (n, 2), and which were found (n,)."""
     # The last view as it would look after the motion `guess`, and where each of its pixels was.
     depth_m = np.where(pair.depth_m > 0, pair.depth_m, HORIZON_M).astype(np.float32)
     points = surface(depth_m, pair.calibration)
@@ -176,8 +176,8 @@ def _solve(
     wheels: Motion,
     calibration: Calibration,
 ) -> Motion | None:
-    """The motion that best explains the points' earlier positions, by Gauss-Newton from `guess`;
-    None if too few agree on it.
+    """Find the motion that best explains the points' earlier positions, by Gauss-Newton from
+    `guess`; None if too few agree on it.
     """
     # The wheels' motion is the prior, and that the robot hardly moves sideways or tilts.
     expected = np.array([wheels.distance_m, 0.0, wheels.turn_rad, 0.0, 0.0])

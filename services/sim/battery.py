@@ -25,28 +25,26 @@ class Battery(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
         msgspec.Meta(
             gt=0,
             le=1e9,
-            description="Time that a full battery lasts at rest, in s, above 0 to 1e9.",
+            description="Time that a full battery lasts at rest, in s.",
         ),
     ] = 1500.0
     cost_per_m: Annotated[
         Share,
-        msgspec.Meta(description="Share of a full battery that a metre's drive costs, 0 to 1."),
+        msgspec.Meta(description="Share of a full battery that a metre's drive costs."),
     ] = 0.001
     charge_s: Annotated[
         PositiveSeconds,
-        msgspec.Meta(
-            description="Time in which an empty battery would be charged, in s, above 0 to 3600."
-        ),
+        msgspec.Meta(description="Time in which an empty battery would be charged, in s."),
     ] = 60.0
     charge_within_m: Annotated[
         PositiveMetres,
         msgspec.Meta(
             description="Distance from a charging place at most, of a robot that is charged as it "
-            "stands, in m, above 0 to 10000."
+            "stands, in m."
         ),
     ] = 7.0
     places: Annotated[
-        int, msgspec.Meta(ge=1, le=100, description="Charging places in the town, 1 to 100.")
+        int, msgspec.Meta(ge=1, le=100, description="Charging places in the town.")
     ] = 4
 
 
@@ -64,12 +62,12 @@ class PowerSupply:
 
     @property
     def is_out(self) -> bool:
-        """Whether the wheels get no power any more."""
+        """Return whether the wheels get no power any more."""
         return self._level <= 0.0
 
     @property
     def level(self) -> float | msgspec.UnsetType:
-        """The level, 0 to 1, as the truth has it; UNSET without a battery."""
+        """Return the true level, 0 to 1; UNSET without a battery."""
         return msgspec.UNSET if self._battery is None else self._level
 
     def resume(self, level: float | msgspec.UnsetType) -> None:
@@ -95,7 +93,7 @@ class PowerSupply:
         self._level = max(0.0, self._level - used)
 
     def sensed(self, stamp_ns: int, frame: int) -> list[Message]:
-        """What the body senses of it with a view; nothing without a battery."""
+        """Return the energy that the body senses with a view; nothing without a battery."""
         if self._battery is None:
             return []
 

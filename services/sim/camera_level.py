@@ -36,7 +36,7 @@ class PhysicalRobot:
 
     @property
     def collisions(self) -> int:
-        """How often it ran into something."""
+        """Return how often it ran into something."""
         return self._world.collisions
 
     def drive(self, command: MotorCommand) -> None:

@@ -35,18 +35,16 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 
     seed: Annotated[
         int,
-        msgspec.Meta(ge=0, le=2**32, description="Seed of the town and of all noise, 0 to 2^32."),
+        msgspec.Meta(ge=0, le=2**32, description="Seed of the town and of all noise."),
     ] = 1
     frame_hz: Annotated[
         int,
         msgspec.Meta(ge=1, le=20, description="Stereo frames a second, in Hz, a divisor of 20."),
     ] = 5
-    width_px: Annotated[
-        Side, msgspec.Meta(description="Width of a camera image, in pixels, 64 to 1024.")
-    ] = 320
-    height_px: Annotated[
-        Side, msgspec.Meta(description="Height of a camera image, in pixels, 64 to 1024.")
-    ] = 240
+    width_px: Annotated[Side, msgspec.Meta(description="Width of a camera image, in pixels.")] = 320
+    height_px: Annotated[Side, msgspec.Meta(description="Height of a camera image, in pixels.")] = (
+        240
+    )
     egl: Annotated[
         bool,
         msgspec.Meta(description="Render by EGL where it works; otherwise by TinyRenderer."),
@@ -68,7 +66,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     ] = "loop"
     town_size_m: Annotated[
         float,
-        msgspec.Meta(ge=120, le=500, description="Side of a town of blocks, in m, 120 to 500."),
+        msgspec.Meta(ge=120, le=500, description="Side of a town of blocks, in m."),
     ] = 200.0
     start: Annotated[
         int,
@@ -81,9 +79,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     sensing: Annotated[
         Literal["cameras", "percepts"],
         msgspec.Meta(
-            description="cameras: rendered images and odometry are published, and perception runs. "
-            "percepts: published, in lockstep, with the errors that perception was measured to "
-            "make."
+            description="cameras: rendered images and odometry are published, and perception "
+            "runs. percepts: published, in lockstep, with the errors that perception "
+            "was measured to make."
         ),
     ] = "cameras"
     duration_s: Annotated[
@@ -91,7 +89,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             gt=0,
             le=1e6,
-            description="Simulated time of a drive at most, in s, above 0 to 1e6.",
+            description="Simulated time of a drive at most, in s.",
         ),
     ] = 900.0
     ends_at_goal: Annotated[
@@ -117,7 +115,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
 
     @property
     def renders(self) -> bool:
-        """Whether images are rendered, rather than percepts simulated."""
+        """Return whether images are rendered, rather than percepts simulated."""
         sensing = self.sensing if self.trajectory is None else self.trajectory.sensing
         return sensing == "cameras"
 

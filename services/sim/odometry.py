@@ -18,16 +18,16 @@ class Noise(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tru
     """
 
     speed: Annotated[
-        Share, msgspec.Meta(description="Standard deviation of the factor on speed, 0 to 1.")
+        Share, msgspec.Meta(description="Standard deviation of the factor on speed.")
     ] = 0.1
     turn: Annotated[
-        Share, msgspec.Meta(description="Standard deviation of the factor on turn rate, 0 to 1.")
+        Share, msgspec.Meta(description="Standard deviation of the factor on turn rate.")
     ] = 0.1
     drift_rad_per_sqrt_m: Annotated[
         Share,
         msgspec.Meta(
             description="Standard deviation of heading after a metre, in rad, growing with the "
-            "root of the distance, 0 to 1."
+            "root of the distance."
         ),
     ] = 0.015
 

@@ -40,7 +40,7 @@ class RealTime:
         self._arrived_ns = 0
 
     def on_start(self) -> None:
-        """Time begins with the next timer."""
+        """Let time begin with the next timer."""
         self._is_started = True
 
     def on_command(self, command: MotorCommand) -> None:

@@ -40,7 +40,7 @@ class Robot:
         )
 
     def pose(self) -> Pose:
-        """The middle of the axle, and the robot's heading."""
+        """Return the middle of the axle, and the robot's heading."""
         (x_m, y_m, _), quaternion = self.position_and_orientation()
         _, _, heading_rad = pybullet.getEulerFromQuaternion(quaternion)
 
@@ -49,7 +49,7 @@ class Robot:
     def position_and_orientation(
         self,
     ) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
-        """The axle's middle in metres, and a quaternion (x, y, z, w)."""
+        """Return the axle's middle in metres, and a quaternion (x, y, z, w)."""
         position_m, orientation = pybullet.getBasePositionAndOrientation(
             self.body, physicsClientId=self._client
         )
@@ -122,7 +122,7 @@ class Robot:
 
 
 def upright_quaternion(heading_rad: float) -> tuple[float, float, float, float]:
-    """The orientation (x, y, z, w) of what stands upright and heads there."""
+    """Return the orientation (x, y, z, w) of a body that stands upright and heads there."""
     half_rad = heading_rad / 2
     return 0.0, 0.0, math.sin(half_rad), math.cos(half_rad)
 

@@ -23,19 +23,19 @@ class Driver(Protocol):
 
     @property
     def pose(self) -> Pose:
-        """The true pose: the middle of the axle, and the heading."""
+        """Return the true pose: the middle of the axle, and the heading."""
 
     @property
     def travelled_m(self) -> float:
-        """The distance that it has travelled."""
+        """Return the distance that it has travelled."""
 
     @property
     def collisions(self) -> int:
-        """How often it ran into something."""
+        """Return how often it ran into something."""
 
     @property
     def course_share(self) -> float | None:
-        """How much of its course is travelled; None without one."""
+        """Return the share of its course that it has travelled; None without a course."""
 
     def drive(self, command: MotorCommand) -> None:
         """Obey a command from now on."""

@@ -21,20 +21,18 @@ SAME_POINT_M = 1e-6
 class Landmark(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """A building that perception knows by name."""
 
-    name: Annotated[Name, msgspec.Meta(description="Its name, 1 to 200 characters.")]
-    x_m: Annotated[Coordinate, msgspec.Meta(description="x of its centre, in m, -1e6 to 1e6.")]
-    y_m: Annotated[Coordinate, msgspec.Meta(description="y of its centre, in m, -1e6 to 1e6.")]
-    width_m: Annotated[
-        PositiveMetres, msgspec.Meta(description="Its apparent width, in m, above 0 to 10000.")
-    ] = 10.0
-    height_m: Annotated[
-        PositiveMetres, msgspec.Meta(description="Its apparent height, in m, above 0 to 10000.")
-    ] = 8.0
+    name: Annotated[Name, msgspec.Meta(description="Its name.")]
+    x_m: Annotated[Coordinate, msgspec.Meta(description="The x of its centre, in m.")]
+    y_m: Annotated[Coordinate, msgspec.Meta(description="The y of its centre, in m.")]
+    width_m: Annotated[PositiveMetres, msgspec.Meta(description="Its apparent width, in m.")] = 10.0
+    height_m: Annotated[PositiveMetres, msgspec.Meta(description="Its apparent height, in m.")] = (
+        8.0
+    )
     function: Annotated[
         str,
         msgspec.Meta(
-            description="What it is used for, as perception knows of one by that name; empty where "
-            "it does not, at most 200 characters.",
+            description="What it is used for, as perception knows of one by that name; empty "
+            "where it does not.",
             max_length=200,
         ),
     ] = ""
@@ -49,17 +47,18 @@ class Trajectory(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_field
 
     line_m: Annotated[
         list[tuple[Coordinate, Coordinate]],
-        msgspec.Meta(min_length=2, description="Points of the line, x and y in m, -1e6 to 1e6."),
+        msgspec.Meta(min_length=2, description="Points of the line, x and y in m."),
     ]
     landmarks: Annotated[list[Landmark], msgspec.Meta(description="Buildings along the line.")]
-    speed_m_s: Annotated[
-        PositiveSpeed, msgspec.Meta(description="Speed of the robot, in m/s, above 0 to 100.")
-    ] = 5.0
+    speed_m_s: Annotated[PositiveSpeed, msgspec.Meta(description="Speed of the robot, in m/s.")] = (
+        5.0
+    )
     sensing: Annotated[
         Literal["percepts", "cameras"],
         msgspec.Meta(
-            description="percepts: published with the errors that perception was measured to make. "
-            "cameras: rendered images and odometry are published, and perception runs."
+            description="percepts: published with the errors that perception was measured to "
+            "make. cameras: rendered images and odometry are published, and "
+            "perception runs."
         ),
     ] = "percepts"
 
@@ -80,11 +79,11 @@ class Line:
 
     @property
     def length_m(self) -> float:
-        """Distance from its start to its end, along it."""
+        """Return the distance from its start to its end, along it."""
         return float(self.along_m[-1])
 
     def at(self, along_m: float) -> Pose:
-        """The pose there, heading as the line does; at a corner as it does after the corner."""
+        """Return the pose there, heading as the line does; at a corner as it does after it."""
         corners_passed = int(np.searchsorted(self.along_m, along_m, "right"))
         last = len(self.heading_rad) - 1
         heading_rad = self.heading_rad[min(corners_passed - 1, last)]
@@ -99,8 +98,8 @@ class Line:
         )
 
     def legs(self, from_m: float, to_m: float) -> list[Leg]:
-        """The line between two distances as (length_m, turn_rad): straight, then a turn on the
-        spot.
+        """Return the line between two distances as (length_m, turn_rad): straight, then a turn on
+        the spot.
         """
         legs = []
         for start_m, end_m in pairwise(self._stops_m(from_m, to_m)):
@@ -113,7 +112,7 @@ class Line:
         return legs
 
     def _stops_m(self, from_m: float, to_m: float) -> list[float]:
-        """The two distances, and those of the points between them."""
+        """Return the two distances, and those of the points between them."""
         is_between = (self.along_m > from_m) & (self.along_m <= to_m)
         stops_m = [from_m, *self.along_m[is_between].tolist()]
         if stops_m[-1] != to_m or len(stops_m) == 1:
@@ -122,5 +121,5 @@ class Line:
         return stops_m
 
     def nearest(self, points_m: Floats) -> Floats:
-        """(n, 2): the points of the line nearest to each of (n, 2) points."""
+        """Return the (n, 2) points of the line nearest to each of (n, 2) points."""
         return nearest_on_line(self.points, points_m).foot_m

@@ -95,7 +95,7 @@ class World:
             self._follow(pose.x_m, pose.y_m)
 
     def pose(self) -> Pose:
-        """The robot's pose."""
+        """Return the robot's pose."""
         return self.robot.pose()
 
     def place_robot(self, pose: Pose) -> None:
@@ -149,7 +149,7 @@ class World:
             self.props.append(self._builder.prop(prop, is_solid=False))
 
     def _pieces(self) -> list[Piece]:
-        """The streets tile by tile, the buildings and the props."""
+        """Return the pieces of the town: the streets tile by tile, the buildings and the props."""
         pieces = [_tile(self._builder, roads) for roads in _tiles(self.town.roads)]
 
         for plot in self.town.plots:
@@ -176,7 +176,7 @@ class World:
 
 
 def _tiles(roads: Sequence[Road]) -> list[tuple[Road, ...]]:
-    """The roads by the tile of the plane that the middle of each is in."""
+    """Group the roads by the tile of the plane that holds the middle of each."""
     tiles: dict[tuple[int, int], list[Road]] = {}
     for road in roads:
         x_m, y_m = road.middle
@@ -190,7 +190,7 @@ def _tiles(roads: Sequence[Road]) -> list[tuple[Road, ...]]:
 
 
 def _tile(builder: Builder, roads: tuple[Road, ...]) -> Piece:
-    """The streets of a tile."""
+    """Make one piece of the streets of a tile."""
     lines = [(road.start, road.end) for road in roads]
     ends_m = np.array(lines, float).reshape(-1, 2)
     low_m = ends_m.min(axis=0)
@@ -206,7 +206,7 @@ def _tile(builder: Builder, roads: tuple[Road, ...]) -> Piece:
 
 
 def _relief(town: Place) -> Singles:
-    """The height of the town's buildings and props."""
+    """Compute the relief of the town's buildings and props."""
     boxes = [(plot.footprint, plot.kind.height_m) for plot in town.plots]
     for prop in town.props:
         _, _, height_m = prop.size_m
@@ -216,7 +216,7 @@ def _relief(town: Place) -> Singles:
 
 
 def _on_tile(where_m: float) -> float:
-    """The nearest multiple of the grass's tile, so that its picture stays in place."""
+    """Round to a multiple of the grass's tile, so that its picture stays in place."""
     tiles = round(where_m / scenery.GRASS_TILE_M)
 
     return tiles * scenery.GRASS_TILE_M

@@ -74,10 +74,10 @@ class Ledger:
         return delta
 
     def validate(self, proposals: list[Proposal]) -> list[Proposal]:
-        """The proposals that are valid, in order; the next delta counts the others.
+        """Return the proposals that are valid, in order; the next delta counts the others.
 
-        Of those that write the same column of a tile the first is: the others were computed without
-        what it adds.
+        Of those that write the same column of a tile the first is valid: the others were computed
+        without what it adds.
         """
         valid = []
         written: set[Key] = set()
@@ -105,8 +105,8 @@ class Ledger:
             self._reasons.append(reason[:MAX_REASON_CHARACTERS])
 
     def check(self, proposal: Proposal) -> set[Key]:
-        """The columns of tiles that `proposal` writes. Raises MessageError if it is not valid,
-        stating why.
+        """Return the columns of tiles that `proposal` writes. Raises MessageError if it is not
+        valid, stating why.
         """
         name = f"proposal {proposal.task_id}"
         if proposal.failure:
@@ -159,7 +159,7 @@ class Ledger:
 
 
 def coalitions_of(context: CycleContext, proposals: list[Proposal]) -> Coalitions:
-    """What all attention codelets have found in a cycle, perhaps nothing."""
+    """Gather what all attention codelets have found in a cycle, perhaps nothing."""
     found = []
     for proposal in proposals:
         for number, coalition in enumerate(proposal.coalitions):
@@ -169,8 +169,8 @@ def coalitions_of(context: CycleContext, proposals: list[Proposal]) -> Coalition
 
 
 def _frames_of(operation: Operation) -> list[Key]:
-    """The maps in whose frames an operation writes: where one has changed, an answer is late. Cells
-    of the root map are written as they are.
+    """Return the maps in whose frames an operation writes: if one has changed, an answer is late.
+    Cells of the root map are written as they are.
     """
     if isinstance(operation, Cells) and operation.map != ROOT_MAP:
         return [operation.map]

@@ -14,16 +14,16 @@ Milliseconds = Annotated[float, msgspec.Meta(gt=0, le=3.6e6)]
 class GivenGoal(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """A goal that the agent has from its start."""
 
-    name: Annotated[Name, msgspec.Meta(description="What it is called; no two have one name")]
+    name: Annotated[Name, msgspec.Meta(description="What it is called; no two have one name.")]
     object: Annotated[
         str,
-        msgspec.Meta(description="Label of the object to go to; empty for a position"),
+        msgspec.Meta(description="Label of the object to go to; empty for a position."),
     ] = ""
     x_m: Annotated[
-        Finite, msgspec.Meta(description="Position ahead of where the agent starts, m")
+        Finite, msgspec.Meta(description="Position ahead of where the agent starts, m.")
     ] = 0.0
     y_m: Annotated[
-        Finite, msgspec.Meta(description="Position left of where the agent starts, m")
+        Finite, msgspec.Meta(description="Position left of where the agent starts, m.")
     ] = 0.0
 
 
@@ -33,34 +33,36 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     cell_m: Annotated[
         float,
         msgspec.Meta(
-            gt=0, le=1e4, description="Distance between neighbouring place nodes of the root map, m"
+            gt=0,
+            le=1e4,
+            description="Distance between neighbouring place nodes of the root map, m.",
         ),
     ] = 1.0
     deadline_ms: Annotated[
         Milliseconds,
-        msgspec.Meta(description="In real time, the age of the view at which a cycle ends, ms"),
+        msgspec.Meta(description="In real time, the age of the view at which a cycle ends, ms."),
     ] = 180.0
     lease_ms: Annotated[
         Milliseconds,
         msgspec.Meta(
-            description="In real time, how long a worker may take for a task before another gets"
-            " it, ms"
+            description="In real time, how long a worker may take for a task before another gets "
+            "it, ms."
         ),
     ] = 120.0
     decay: Annotated[
         Unit,
         msgspec.Meta(
-            description="What a node's activation loses in a cycle. LIDA: 0.1 in a tick;"
-            " here in a cycle of 40, because percepts and codelets excite nodes once in each: by"
-            " the tick nothing would last from one view to the next"
+            description="What a node's activation loses in a cycle. LIDA: 0.1 in a tick; here in "
+            "a cycle of 40, because percepts and codelets excite nodes once in each: "
+            "by the tick nothing would last from one view to the next."
         ),
     ] = 0.1
     base_level_decay: Annotated[
         Unit,
         msgspec.Meta(
-            description="What a node's base level loses in a cycle. LIDA: 0.1 in a tick, of"
-            " current activation; here so little, because a base level is memory: what one"
-            " broadcast adds lasts for 40 s"
+            description="What a node's base level loses in a cycle. LIDA: 0.1 in a tick, of "
+            "current activation; here so little, because a base level is memory: what "
+            "one broadcast adds lasts for 40 s."
         ),
     ] = 0.0005
     background_cycles: Annotated[
@@ -69,24 +71,24 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             ge=1,
             le=1000,
             description="In lockstep, cycles after which a background codelet's answer is "
-            "committed",
+            "committed.",
         ),
     ] = 3
     goals: Annotated[
-        list[GivenGoal], msgspec.Meta(description="Goals that the agent is given")
+        list[GivenGoal], msgspec.Meta(description="Goals that the agent is given.")
     ] = []
     goals_after_s: Annotated[
         float,
         msgspec.Meta(
             ge=0,
             le=1e6,
-            description="Time from which on it has them, in s; 0: from its start",
+            description="Time from which on it has them, in s; 0: from its start.",
         ),
     ] = 0.0
     in_order: Annotated[
         bool,
         msgspec.Meta(
-            description="Whether each of these goals counts once the one before is reached; if not,"
-            " the agent decides their order"
+            description="Whether each of these goals counts once the one before is reached; if "
+            "not, the agent decides their order."
         ),
     ] = False

@@ -93,7 +93,7 @@ class Workspace:
         self._consciousness.restore(self._ledger.graph.cycle)
 
     def snapshot(self, request: SnapshotRequest | None = None) -> Snapshot:
-        """The whole graph.
+        """Return the whole graph.
 
         Raises MessageError if `request` asks for a version that is not committed yet.
         """
@@ -136,7 +136,7 @@ class Workspace:
         return self._begin()
 
     def on_competition(self, competition: Competition) -> list[Message]:
-        """A competition for consciousness has ended."""
+        """Note that a competition for consciousness has ended."""
         self._consciousness.on_competition(competition)
         return self._begin()
 
@@ -178,7 +178,7 @@ class Workspace:
         return [delta, *proposal.events]
 
     def on_presence(self, presence: Presence) -> list[Message]:
-        """A worker came or went; the cycle continues without a task that has failed."""
+        """Note that a worker came or went; the cycle continues without a task that has failed."""
         if presence.module != WORKERS:
             return []
 
@@ -190,10 +190,10 @@ class Workspace:
         return self._continue_if_complete(published)
 
     def on_clock(self, clock: Clock) -> list[Message]:
-        """In real time, revoke leases that have ended, and end a cycle at its deadline.
+        """Revoke leases that have ended, and end a cycle at its deadline: in real time alone.
 
-        The newest clock is taken as it is: after one that ran far ahead, once, no later deadline
-        would be kept.
+        Each clock counts, even if earlier than the one before: else, after one that ran far ahead,
+        no later deadline would be kept.
         """
         self._now_ns = clock.stamp_ns
         if self._is_lockstep:
@@ -214,8 +214,8 @@ class Workspace:
 
     @property
     def _awaits_answers(self) -> bool:
-        """Whether the phase waits for answers: in lockstep for those of lanes too, so that these
-        read the graph as it was when their tasks began.
+        """Return whether the phase waits for answers: in lockstep for those of lanes too, so that
+        these read the graph as it was when their tasks began.
         """
         awaited = [self._dispatch]
         if self._is_lockstep:
@@ -230,7 +230,7 @@ class Workspace:
         return agent.stamp_ns
 
     def _is_interrupted(self, percepts: Percepts) -> bool:
-        """Whether those are the percepts of a cycle that ended before its last phase."""
+        """Decide whether those are the percepts of a cycle that ended before its last phase."""
         if self._context is not None or percepts.stamp_ns != self._begun_ns:
             return False
         return self._ledger.graph.phase is not Phase.END
@@ -319,7 +319,7 @@ class Workspace:
         return self._continue_if_complete([*published, *beside])
 
     def _continue_if_complete(self, published: list[Message]) -> list[Message]:
-        """`published`, and the next phase where no answer is waited for in this one."""
+        """Add the next phase to `published`, if no answer is waited for in this one."""
         if self._context is None or self._awaits_answers:
             return published
         return [*published, *self._commit_answers(), *self._next_phase()]

@@ -32,7 +32,7 @@ class Lease:
 
     @property
     def is_open(self) -> bool:
-        """Whether no answer has come yet."""
+        """Return whether no answer has come yet."""
         return self.proposal is None
 
 
@@ -50,14 +50,14 @@ class Dispatch:
         self._leases: dict[str, Lease] = {}
 
     def begin(self, tasks: list[Task], now_ns: int) -> list[Message]:
-        """Add `tasks`; what is to be published now. If there is no worker they wait for one."""
+        """Add `tasks`; return what is to be published now. Without a worker they wait for one."""
         for task in tasks:
             self._leases[task.task_id] = Lease(task, now_ns)
 
         return self._assign(now_ns)
 
     def presence(self, worker: str, alive: bool, now_ns: int) -> list[Message]:
-        """A worker came or went; what is to be published because of it."""
+        """Note that a worker came or went; return what is to be published because of it."""
         if alive:
             self._workers.add(worker)
         else:
@@ -67,7 +67,7 @@ class Dispatch:
         return self._assign(now_ns)
 
     def expire(self, now_ns: int) -> list[Message]:
-        """Give tasks whose lease has ended to another worker; they stay where there is no other."""
+        """Give tasks whose lease has ended to another worker; they stay if there is no other."""
 
         def has_ended(lease: Lease) -> bool:
             if now_ns <= lease.until_ns:
@@ -99,12 +99,12 @@ class Dispatch:
 
     @property
     def is_idle(self) -> bool:
-        """Whether it has no tasks at all."""
+        """Return whether it has no tasks at all."""
         return not self._leases
 
     @property
     def complete(self) -> bool:
-        """Whether every task is answered, or has failed."""
+        """Return whether every task is answered, or has failed."""
         for lease in self._leases.values():
             if lease.is_open and not self._has_failed(lease):
                 return False
@@ -113,7 +113,7 @@ class Dispatch:
 
     @property
     def failed(self) -> list[str]:
-        """The tasks that were given out as often as is allowed, and lost each time."""
+        """Return the tasks that were given out as often as is allowed, and lost each time."""
         names = []
         for name, lease in self._leases.items():
             if self._has_failed(lease):
@@ -122,7 +122,7 @@ class Dispatch:
         return names
 
     def collect(self) -> tuple[list[Proposal], list[Task]]:
-        """The answers, in the order of the tasks, and the tasks without one; both are removed."""
+        """Take out the answers, in the order of the tasks, and the tasks without one."""
         answers = []
         unanswered = []
         for lease in self._leases.values():
@@ -135,11 +135,11 @@ class Dispatch:
         return answers, unanswered
 
     def load(self) -> Counter[str]:
-        """How many open tasks each worker holds."""
+        """Count the open tasks that each worker holds."""
         return Counter(lease.worker for lease in self.held())
 
     def held(self) -> list[Lease]:
-        """The open tasks that workers hold."""
+        """Return the open tasks that workers hold."""
         return [lease for lease in self._leases.values() if lease.is_open and lease.worker]
 
     def _has_failed(self, lease: Lease) -> bool:

@@ -40,7 +40,7 @@ class Forgetting:
                 self._put(operation, graph)
 
     def due(self, graph: Graph) -> list[DropNode]:
-        """The nodes to be forgotten at the end of the current cycle, by id."""
+        """Return the nodes to be forgotten at the end of the current cycle, by id."""
         forgotten = []
         for cycle in range(self._newest + 1, graph.cycle + 1):
             for name in self._buckets.pop(cycle, {}):

@@ -52,7 +52,7 @@ class Candidate(NamedTuple):
 
 
 def individuals(percepts: Percepts, graph: Graph, motions: Array) -> Percepts:
-    """`percepts`, each by the label of the individual object that it is of.
+    """Label each of `percepts` by the individual object that it is of.
 
     `motions` are those since the self node was moved last.
     """
@@ -88,7 +88,7 @@ def individuals(percepts: Percepts, graph: Graph, motions: Array) -> Percepts:
 
 
 def as_entered(percepts: Percepts, graph: Graph) -> Percepts:
-    """`percepts` by the labels with which they entered the graph in this cycle, before the
+    """Return `percepts` by the labels with which they entered the graph in this cycle, before the
     workspace was interrupted.
     """
     label_of = {}
@@ -107,8 +107,8 @@ def as_entered(percepts: Percepts, graph: Graph) -> Percepts:
 def _standing_there(
     percept: Percept, candidate: Candidate, graph: Graph, others: Collection[str]
 ) -> str:
-    """The label of the object that a percept can only be of, by where it is: the nearest that was
-    seen recently, and is not among `others`. Empty if there is none.
+    """Find the object that a percept can only be of, by where it is: the nearest that was seen
+    recently, and is not among `others`. Return its label, empty if there is none.
     """
     agent = graph.agent
     assert agent is not None
@@ -163,7 +163,7 @@ def _candidate(percept: Percept, pose: Floats, agent: Self, graph: Graph) -> Can
 
 
 def _sd_m(percept: Percept, agent: Self, node: Object) -> float:
-    """The standard deviation of the distance between where an object is seen and where it is."""
+    """Return the standard deviation of the distance from where an object is seen to where it is."""
     bearing_sd_rad = math.hypot(percept.bearing_sd_rad, agent.heading_sd_rad)
     across_sd_m = percept.range_m * bearing_sd_rad
     return math.hypot(

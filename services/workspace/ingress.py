@@ -51,7 +51,7 @@ kept that were seen in a few views from one side: placed badly, they would misle
 
 
 def first_operations(graph: Graph, config: Config) -> list[Operation]:
-    """The root map, the rates of decay and the self node, as far as the graph lacks them.
+    """Make the root map, the rates of decay and the self node, as far as the graph lacks them.
 
     The agent's first pose is the origin of its root map, for certain.
     """
@@ -77,8 +77,8 @@ def first_operations(graph: Graph, config: Config) -> list[Operation]:
 
 
 def first_goals(config: Config, before_ns: int, now_ns: int) -> list[Goal]:
-    """The goals that the agent is given by its settings, in their order, if that is due between the
-    view of the cycle before and this one.
+    """Return the goals that the settings give the agent, in their order, if they are due between
+    the view of the cycle before and this one.
     """
     due_ns = round(config.goals_after_s * 1e9)
     if not before_ns < due_ns <= now_ns:
@@ -108,7 +108,7 @@ def check_percepts(percepts: Percepts) -> None:
 
 
 def recognised(percepts: Percepts) -> Percepts:
-    """`percepts` without the objects for which the view's evidence is not above `threshold`: what
+    """Leave out the objects whose evidence in the view is not above `RECOGNITION_THRESHOLD`: what
     they are is too uncertain to map by, however much they were expected.
     """
     objects = [percept for percept in percepts.objects if percept.evidence > RECOGNITION_THRESHOLD]
@@ -120,7 +120,7 @@ def recognised(percepts: Percepts) -> Percepts:
 def expected_operations(
     graph: Graph, percepts: Percepts, entering: list[Operation], cycle: int
 ) -> list[Operation]:
-    """`entering`, with the objects of the map that were recognised with the help of what was
+    """Add to `entering` the objects of the map that were recognised with the help of what was
     conscious before: they are as active as their percepts, and are not placed anew.
     """
     excited: dict[str, Object] = {}
@@ -147,7 +147,7 @@ def expected_operations(
 
 
 def percept_operations(graph: Graph, context: CycleContext) -> list[Operation]:
-    """The PAM nodes over threshold, each linked to the object that it is an instance of."""
+    """Make the PAM nodes over threshold, each linked to the object that it is an instance of."""
     operations: list[Operation] = []
     weights = {}
     for percept in context.percepts.objects:

@@ -27,11 +27,11 @@ class Lanes:
                 self._lanes.append(Lane(codelet, config, run, self.dispatches))
 
     def dispatches(self) -> list[Dispatch]:
-        """The dispatch of each lane."""
+        """Return the dispatch of each lane."""
         return [lane.dispatch for lane in self._lanes]
 
     def begin(self, context: CycleContext, ledger: Ledger, now_ns: int) -> list[Message]:
-        """Begin a task in each lane where none runs and one is due; what is to be published."""
+        """Begin a task in each lane if none runs there and one is due; return what to publish."""
         published: list[Message] = []
         for lane in self._lanes:
             published += lane.begin(context, ledger, now_ns)
@@ -39,11 +39,11 @@ class Lanes:
         return published
 
     def answer(self, proposal: Proposal) -> bool:
-        """Whether a proposal answers a task of a lane."""
+        """Give a proposal to the lane whose task it answers; return whether there is one."""
         return any(dispatch.answer(proposal) for dispatch in self.dispatches())
 
     def presence(self, worker: str, is_alive: bool, version: int, now_ns: int) -> list[Message]:
-        """A worker came or went; what is to be published."""
+        """Note that a worker came or went; return what is to be published."""
         published: list[Message] = []
         for dispatch in self.dispatches():
             dispatch.refresh(version)
@@ -52,7 +52,7 @@ class Lanes:
         return published
 
     def expire(self, version: int, now_ns: int) -> list[Message]:
-        """Revoke leases that have ended; what is to be published."""
+        """Revoke leases that have ended; return what is to be published."""
         published: list[Message] = []
         for dispatch in self.dispatches():
             dispatch.refresh(version)
@@ -61,7 +61,7 @@ class Lanes:
         return published
 
     def collect(self, cycle: int) -> Iterator[tuple[list[Proposal], list[str]]]:
-        """Of each lane, the answer to be committed at the end of `cycle`, and tasks that failed."""
+        """Yield, for each lane, the answer to commit at the end of `cycle`, and failed tasks."""
         for lane in self._lanes:
             yield lane.collect(cycle)
 
@@ -88,7 +88,7 @@ class Lane:
         self._due_cycle = 0
 
     def begin(self, context: CycleContext, ledger: Ledger, now_ns: int) -> list[Message]:
-        """Begin a task where none runs and one is due; what is to be published."""
+        """Begin a task if none runs and one is due; return what is to be published."""
         if not self.dispatch.is_idle:
             return []
 
@@ -100,7 +100,7 @@ class Lane:
         return self.dispatch.begin(tasks, now_ns)
 
     def collect(self, cycle: int) -> tuple[list[Proposal], list[str]]:
-        """The answer, where it is to be committed at the end of `cycle`, and tasks that failed."""
+        """Take the answer, if it is to be committed at the end of `cycle`, and failed tasks."""
         if self.dispatch.is_idle or not self.dispatch.complete:
             return [], []
 

@@ -21,7 +21,7 @@ def build(
     codelets: Sequence[ConfiguredCodelet],
     run: Run = REAL_TIME,
 ) -> Module:
-    """The module `workspace`, the single writer of the graph, which calls `codelets`. Raises
+    """Build the module `workspace`, the single writer of the graph, which calls `codelets`. Raises
     ConfigError if two goals have one name.
     """
     names = [goal.name for goal in config.goals]

@@ -40,7 +40,7 @@ class Offers:
         self._newest_cycle[offer.source] = max(newest, offer.cycle)
 
     def complete(self, ended_cycle: int) -> bool:
-        """Whether every awaited instance has made its offer after `ended_cycle`."""
+        """Decide whether every awaited instance has made its offer after `ended_cycle`."""
         for name in self._awaited:
             newest = self._newest_cycle.get(name, 0)
             if newest < ended_cycle:
@@ -49,7 +49,7 @@ class Offers:
         return True
 
     def take(self, ledger: Ledger, entering: list[Operation], cycle: int) -> list[Operation]:
-        """The operations of all valid offers, in order of source and number, as of `cycle`, in
+        """Take the operations of all valid offers, in order of source and number, as of `cycle`, in
         which `entering` is written before them.
 
         The ledger rejects the others, and objects that are on the map already.
@@ -77,7 +77,7 @@ class Offers:
 def _with_objects(
     operations: list[Operation], ledger: Ledger, entering: list[Operation]
 ) -> list[Operation]:
-    """`operations`, with each object at its place node, without those that are on the map already:
+    """Link each object of `operations` to its place node; reject those that are on the map already:
     their label is taken, perhaps by what is seen right now, or one of their look is at that place.
     """
     graph = ledger.graph

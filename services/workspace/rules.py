@@ -46,15 +46,15 @@ _LINK_KINDS = frozenset(map(str, LinkKind))
 
 
 def may_offer(written: object) -> bool:
-    """The writer of offers: kinds that the table lets be offered, and links of other kinds."""
+    """Decide whether the table lets a kind be offered. Offers may write links of other kinds."""
     if not isinstance(written, type):
         return False
     return KINDS[written].offered
 
 
 def written_by(operation: Operation) -> Iterable[Key]:
-    """What an operation rewrites: a node's id, or tiles' columns; nothing for links, which many may
-    write.
+    """Yield what an operation rewrites: a node's id, or tiles' columns; nothing for links, which
+    many may write.
     """
     if isinstance(operation, Cells):
         cells = np.asarray(operation.cells.numpy(), np.int64)
@@ -143,7 +143,7 @@ def _check_drop(name: str, drop: DropNode, graph: Graph, writer: Writer) -> None
 
 
 def _check_drop_places(name: str, drop: DropPlaces, graph: Graph, writer: Writer) -> None:
-    """Who may give a map another frame may drop the places that are in the one before."""
+    """Let a writer drop the places in a map's frame only if it may give the map another frame."""
     _check_map(name, drop.map, graph)
     if drop.map == ROOT_MAP:
         raise MessageError(f"{name}: the places of {ROOT_MAP} are never forgotten")
@@ -152,7 +152,7 @@ def _check_drop_places(name: str, drop: DropPlaces, graph: Graph, writer: Writer
 
 
 def _check_cells(name: str, operation: Cells, graph: Graph, writer: Writer) -> None:
-    """Place nodes are created by the tile, so their number and distance are bounded."""
+    """Check cells. The tile creates place nodes, so their number and distance are bounded."""
     if not writer(operation.column):
         raise MessageError(f"{name} may not write the place column {operation.column}")
     _check_map(name, operation.map, graph)

@@ -29,8 +29,8 @@ class SelfMotions:
         self._motions: list[SelfMotion] = []
 
     def put(self, motion: SelfMotion, moved_ns: int) -> None:
-        """Keep self-motion, once, where it is newer than `moved_ns`. Raises MessageError if its
-        rows are of another shape or dtype.
+        """Keep self-motion, once, if it is newer than `moved_ns`. Raises MessageError if its rows
+        are of another shape or dtype.
         """
         shape = motion.motions.shape
         dtype = motion.motions.dtype
@@ -44,11 +44,11 @@ class SelfMotions:
             self._motions.append(motion)
 
     def newest_ns(self) -> int:
-        """Until when the motion is known; -1 where none is kept."""
+        """Return until when the motion is known; -1 if none is kept."""
         return self._motions[-1].stamp_ns if self._motions else -1
 
     def rows(self, moved_ns: int, stamp_ns: int) -> Array:
-        """The rows from `moved_ns` up to `stamp_ns`, float64 (n, 5)."""
+        """Return the rows from `moved_ns` up to `stamp_ns`, float64 (n, 5)."""
         rows = [np.zeros((0, SELF_MOTION_COLUMNS))]
         for motion in self._motions:
             is_due = motion.since_ns >= moved_ns and motion.stamp_ns <= stamp_ns
@@ -105,11 +105,11 @@ class Scans:
             del self._scans[min(self._scans)]
 
     def has(self, stamp_ns: int) -> bool:
-        """Whether the cycle of the view at `stamp_ns` waits for its scan no longer."""
+        """Decide whether the cycle of the view at `stamp_ns` waits for its scan no longer."""
         return not self._awaited or stamp_ns in self._scans
 
     def take(self, stamp_ns: int) -> RangeScan | None:
-        """The scan for the cycle of the view at `stamp_ns`; None if there is none."""
+        """Take the scan for the cycle of the view at `stamp_ns`; None if there is none."""
         until_view = [known_ns for known_ns in self._scans if known_ns <= stamp_ns]
         newest_ns = max(until_view, default=-1)
         is_missed = newest_ns != stamp_ns
@@ -138,11 +138,11 @@ class Body:
             del self._sensed[min(self._sensed)]
 
     def has(self, stamp_ns: int) -> bool:
-        """Whether the cycle of the view at `stamp_ns` waits for its energy no longer."""
+        """Decide whether the cycle of the view at `stamp_ns` waits for its energy no longer."""
         return not self._awaited or stamp_ns in self._sensed
 
     def needs(self, stamp_ns: int, cycle: int) -> list[Need]:
-        """The needs at the view at `stamp_ns`: none of a body that senses none, or only later."""
+        """Return the needs at the view at `stamp_ns`; none if none is sensed, or only later."""
         until_view = [known_ns for known_ns in self._sensed if known_ns <= stamp_ns]
         if not until_view:
             return []
@@ -183,20 +183,20 @@ class Sensed:
         self._body.put(energy)
 
     def is_complete(self, stamp_ns: int, moved_ns: int) -> bool:
-        """Whether all that the cycle of the view at `stamp_ns` waits for has come."""
+        """Decide whether all that the cycle of the view at `stamp_ns` waits for has come."""
         has_motion = max(self._motions.newest_ns(), moved_ns) >= stamp_ns
         return has_motion and self._scans.has(stamp_ns) and self._body.has(stamp_ns)
 
     def motions(self, stamp_ns: int, moved_ns: int) -> Array:
-        """The motions since the self node was moved last, up to `stamp_ns`."""
+        """Return the motions since the self node was moved last, up to `stamp_ns`."""
         return self._motions.rows(moved_ns, stamp_ns)
 
     def needs(self, stamp_ns: int, cycle: int) -> list[Need]:
-        """The body's needs at the view at `stamp_ns`."""
+        """Return the body's needs at the view at `stamp_ns`."""
         return self._body.needs(stamp_ns, cycle)
 
     def context(self, percepts: Percepts, motions: Array, cycle: int, version: int) -> CycleContext:
-        """All that was sensed for the view of `percepts`, of which the scan is taken now."""
+        """Gather all that was sensed for the view of `percepts`; its scan is taken now."""
         scan = self._scans.take(percepts.stamp_ns)
         return CycleContext(cycle, percepts, motions, version, scan)
 

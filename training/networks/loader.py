@@ -40,8 +40,8 @@ def prefetch(generate: Callable[[], Iterator[Batch]]) -> DataLoader[list[Tensor]
 def shuffled(
     count: int, batch: int, steps: int, rng: np.random.Generator
 ) -> Iterator[npt.NDArray[np.intp]]:
-    """Return the numbers (batch,) of the examples of each step: all of `count` in any order, but
-    for a rest smaller than a batch, then all again.
+    """Yield the numbers (batch,) of the examples of each step: all of `count` in any order, but for
+    a rest smaller than a batch, then all again.
     """
     order = np.empty(0, np.intp)
     for _ in range(steps):

@@ -68,14 +68,14 @@ def normalized(colours: Tensor) -> Tensor:
 
 
 def _standardized(values: Tensor, minimum: float) -> Tensor:
-    """`values` less their mean in each image, in standard deviations plus `minimum`."""
+    """Return `values` less their mean in each image, in standard deviations plus `minimum`."""
     from_mean = values - values.mean((2, 3), keepdim=True)
     deviation = torch.sqrt(from_mean.square().mean((2, 3), keepdim=True))
     return from_mean / (deviation + minimum)
 
 
 def _around(values: Tensor) -> Tensor:
-    """The mean of the WINDOW_PX by WINDOW_PX pixels about each pixel, those outside left out."""
+    """Average the WINDOW_PX by WINDOW_PX pixels about each pixel, those outside left out."""
     half_px = WINDOW_PX // 2
     rows = functional.avg_pool2d(values, (WINDOW_PX, 1), 1, (half_px, 0), count_include_pad=False)
     return functional.avg_pool2d(rows, (1, WINDOW_PX), 1, (0, half_px), count_include_pad=False)

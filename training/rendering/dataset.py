@@ -61,7 +61,7 @@ class Job:
 
 
 def jobs(out: Path, scale: float) -> Iterator[Job]:
-    """Return the jobs of rendering: the towns of each split times `scale`, at least one."""
+    """Yield the jobs of rendering: the towns of each split times `scale`, at least one."""
     for split in SPLITS:
         for number in range(max(1, round(scale * split.towns))):
             seed = split.first_seed + number

@@ -49,7 +49,7 @@ def kinds(seed: int, invented_count: int) -> tuple[BuildingType, ...]:
 
 
 def viewpoints(place: town.Town, count: int, rng: np.random.Generator) -> Iterator[Pose]:
-    """Return `count` poses in `place`: every second one on a street, about along it, the others
+    """Yield `count` poses in `place`: every second one on a street, about along it, the others
     anywhere free, about towards a building.
     """
     for number in range(count):

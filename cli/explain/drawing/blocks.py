@@ -21,7 +21,7 @@ class Block(Protocol):
 
     @property
     def height_in(self) -> float:
-        """How much of the box it takes."""
+        """Return how much of the box's height it takes."""
 
     def draw(self, axes: Axes, left_in: float, top_in: float, width_in: float) -> None:
         """Draw it below `top_in`."""
@@ -34,7 +34,7 @@ class Gap:
     height_in: float
 
     def draw(self, axes: Axes, left_in: float, top_in: float, width_in: float) -> None:
-        """Nothing."""
+        """Draw nothing."""
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,11 @@ class Words:
 
     @property
     def height_in(self) -> float:
-        """Of all lines."""
+        """Return the height of all lines."""
         return len(self.lines) * line_in(self.size)
 
     def draw(self, axes: Axes, left_in: float, top_in: float, width_in: float) -> None:
-        """Each line below the one before it."""
+        """Draw each line below the one before it."""
         weight = "bold" if self.is_bold else "normal"
         base_in = top_in - 0.8 * line_in(self.size)
         if self.at_right:
@@ -89,11 +89,11 @@ class Bar:
 
     @property
     def height_in(self) -> float:
-        """With a little room around it."""
+        """Return the height of the bar, with a little room around it."""
         return BAR_IN + 0.08
 
     def draw(self, axes: Axes, left_in: float, top_in: float, width_in: float) -> None:
-        """From the left, on a pale ground as long as 1."""
+        """Draw the bar from the left, on a pale ground as long as 1."""
         full_in = width_in - VALUE_IN
         low_in = top_in - BAR_IN - 0.04
         axes.add_patch(Rectangle((left_in, low_in), full_in, BAR_IN, fc=STREET, ec="none"))

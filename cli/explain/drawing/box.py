@@ -35,27 +35,27 @@ class Box:
 
     @property
     def inner_in(self) -> float:
-        """The width of what stands in it."""
+        """Return the width of what stands in it."""
         return self.width_in - 2 * PAD_IN
 
     @property
     def height_in(self) -> float:
-        """The height of what stands in it."""
+        """Return the height of what stands in it."""
         return self.image_in + sum(block.height_in for block in self.blocks)
 
 
 def inner_in(width_in: float) -> float:
-    """How wide what stands in a box of that width may be."""
+    """Return the width that is left for what stands in a box of that width."""
     return width_in - 2 * PAD_IN
 
 
 def note(words: str, width_in: float) -> Words:
-    """Small print in a box of that width."""
+    """Make small print for a box of that width."""
     return Words(wrapped(words, inner_in(width_in), SMALL), SMALL, FAINT)
 
 
 def heading(words: str, at_right: str, width_in: float, colour: str = "") -> Words:
-    """What an entry is called and, at the right, what became of it: in `colour` where it won."""
+    """Make a heading: the name of an entry and, at the right, its fate; in `colour` if it won."""
     room_in = inner_in(width_in)
     if at_right:
         room_in -= width_of(at_right, SIZE, is_bold=True) + 0.08
@@ -69,12 +69,12 @@ def heading(words: str, at_right: str, width_in: float, colour: str = "") -> Wor
 
 
 def others(number: int, width_in: float) -> list[Block]:
-    """How many more than MOST there are of something."""
+    """Note how many more than MOST there are of something."""
     return [note(f"and {number - MOST} more", width_in)] if number > MOST else []
 
 
 def empty(title: str, width_in: float, sentences: Sequence[str]) -> Box:
-    """A stage that did not happen, and why."""
+    """Make the box of a stage that did not happen, and why."""
     blocks: list[Block] = []
     for sentence in sentences:
         blocks += [Words(wrapped(sentence, inner_in(width_in), SIZE), SIZE, INK), BETWEEN]

@@ -25,7 +25,7 @@ from cogmap.schemas.cognition import Coalition, Fate, Rejection
 
 
 def coalitions(moment: Moment) -> Box:
-    """Every contender, the winner first, with its fate."""
+    """Make the box of every contender, the winner first, with its fate."""
     width_in = 2.35
     if moment.competition is None:
         return empty("coalitions", width_in, reasons.of_competition(moment))
@@ -54,7 +54,7 @@ def coalitions(moment: Moment) -> Box:
 
 
 def broadcast(moment: Moment) -> Box:
-    """What became conscious, or what was before."""
+    """Make the box of what became conscious or, if nothing did, of what was before."""
     width_in = 2.15
     if moment.broadcast is None:
         sentences = ["none in this cycle", text.conscious_before(moment)]
@@ -75,7 +75,7 @@ def broadcast(moment: Moment) -> Box:
 
 
 def _origin(moment: Moment) -> str:
-    """Which coalition is conscious, and from when."""
+    """Say which coalition is conscious, and since when."""
     since = text.since(moment, moment.winner)
     return f"{moment.winner}, {since}" if since else moment.winner
 
@@ -89,7 +89,7 @@ def _content(coalition: Coalition, width_in: float) -> list[Block]:
 
 
 def behaviours(moment: Moment) -> Box:
-    """Every scheme that was considered, the chosen one first, with the reason of its rejection."""
+    """Make the box of the schemes considered, the chosen one first, with reasons of rejection."""
     width_in = 2.0
     if moment.action is None:
         return empty("behaviours", width_in, reasons.of_action(moment))
@@ -111,7 +111,7 @@ def behaviours(moment: Moment) -> Box:
 
 
 def command(moment: Moment) -> Box:
-    """How the wheels were driven next."""
+    """Make the box of how the wheels were driven next."""
     width_in = 1.8
     if moment.command is None:
         return empty("command", width_in, ["none that followed is in the log"])

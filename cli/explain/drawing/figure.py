@@ -36,7 +36,7 @@ _STYLE: dict[Any, Any] = {**draw.STYLE, "svg.hashsalt": "cogmap", "text.parse_ma
 
 
 def figure(moment: Moment, suffix: str) -> bytes:
-    """The file, of the kind that `suffix` names. Raises LogError where the view is no image."""
+    """Draw a file of the kind that `suffix` names. Raises LogError if the view is no image."""
     image = _image(moment)
     aspect = 0.0 if image is None else image.shape[0] / image.shape[1]
     stages = [
@@ -86,7 +86,7 @@ def figure(moment: Moment, suffix: str) -> bytes:
 
 
 def _image(moment: Moment) -> Image | None:
-    """The view; None where the log has none. Raises LogError where it is no image."""
+    """Return the view; None if the log has none. Raises LogError if it is no image."""
     if moment.view is None:
         return None
 
@@ -95,7 +95,7 @@ def _image(moment: Moment) -> Image | None:
 
 
 def _draw_boxes(axes: Axes, stages: list[Box], top_in: float, box_in: float) -> None:
-    """Each box with what stands in it, and an arrow to the next."""
+    """Draw each box with what stands in it, and an arrow to the next."""
     left_in = EDGE_IN
     for box in stages:
         if box is not stages[0]:
@@ -145,7 +145,7 @@ def _draw_frame(axes: Axes, box: Box, left_in: float, top_in: float, box_in: flo
 
 
 def _draw_times(axes: Axes, stages: list[Box], width_in: float, y_in: float) -> None:
-    """A strip as long as the cycle, in which each stage has its share of the time."""
+    """Draw a strip as long as the cycle, in which each stage has its share of the time."""
     done_ms = [box.after_ms for box in stages if box.after_ms is not None]
     last_ms = max(done_ms, default=0.0)
     if last_ms <= 0.0:
@@ -177,7 +177,7 @@ def _draw_times(axes: Axes, stages: list[Box], width_in: float, y_in: float) -> 
 
 
 def _draw_view(sheet: Figure, moment: Moment, image: Image, top_in: float) -> None:
-    """The view with what was recognised in it, in the upper part of the first box."""
+    """Draw the view, and what was recognised in it, in the upper part of the first box."""
     wide_in = inner_in(sensing.SENSED_IN)
     high_in = wide_in * image.shape[0] / image.shape[1]
     sheet_in = sheet.get_size_inches()

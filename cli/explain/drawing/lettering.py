@@ -14,19 +14,19 @@ _measure = TextToPath()
 
 
 def line_in(size: float) -> float:
-    """How high a line of text of `size` points is."""
+    """Return the height of a line of text of `size` points."""
     return LEADING * size / POINTS
 
 
 def width_of(text: str, size: float, is_bold: bool = False) -> float:
-    """How wide a text of `size` points is."""
+    """Measure how wide a text of `size` points is."""
     font = FontProperties(size=size, weight="bold" if is_bold else "normal")
     width, _, _ = _measure.get_text_width_height_descent(text, font, False)
     return RENDERED * float(width) / POINTS
 
 
 def wrapped(text: str, width_in: float, size: float, most: int = 99) -> list[str]:
-    """The text in lines of at most that width, at most `most`, the rest left out."""
+    """Split the text into lines of at most that width; leave out what exceeds `most` lines."""
     if not text:
         return []
 
@@ -47,7 +47,7 @@ def wrapped(text: str, width_in: float, size: float, most: int = 99) -> list[str
 
 
 def shortened(text: str, width_in: float, size: float, is_bold: bool = False) -> str:
-    """The text, or as many of its first letters as have room."""
+    """Return the text, or as many of its first letters as have room."""
     if width_of(text, size, is_bold) <= width_in:
         return text
 

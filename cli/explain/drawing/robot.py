@@ -25,12 +25,12 @@ class Robot:
 
     @property
     def height_in(self) -> float:
-        """Of the robot, with the arrows ahead of it and behind it."""
+        """Return the height of the robot, with the arrows ahead of it and behind it."""
         ahead, behind = self._reach()
         return 2 * HALF_ROBOT_IN + ahead + behind + 0.16
 
     def draw(self, axes: Axes, left_in: float, top_in: float, width_in: float) -> None:
-        """In the middle of the box."""
+        """Draw the robot in the middle of the box."""
         centre_in = left_in + width_in / 2
         ahead, _ = self._reach()
         middle_in = top_in - 0.08 - ahead - HALF_ROBOT_IN
@@ -60,7 +60,7 @@ class Robot:
             )
 
     def _reach(self) -> tuple[float, float]:
-        """How far the arrows reach ahead of the robot, and behind it."""
+        """Compute how far the arrows reach ahead of the robot, and behind it."""
         speeds_rad_s = (self.left_rad_s, self.right_rad_s)
         ahead = max(0.0, *(_arrow_in(speed) for speed in speeds_rad_s))
         behind = max(0.0, *(-_arrow_in(speed) for speed in speeds_rad_s))
@@ -87,5 +87,5 @@ class Robot:
 
 
 def _arrow_in(speed_rad_s: float) -> float:
-    """How long the arrow of a wheel is, negative backwards."""
+    """Compute the length of a wheel's arrow, negative backwards."""
     return max(-1.0, min(1.0, speed_rad_s / FASTEST_RAD_S)) * ARROW_IN

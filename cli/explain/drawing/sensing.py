@@ -24,7 +24,7 @@ SENSED_IN = 2.3
 
 
 def sensed(moment: Moment, aspect: float) -> Box:
-    """The view, whose height is `aspect` of its width; the image itself is not drawn here."""
+    """Make the box of the view, `aspect` times as high as wide; the image is not drawn here."""
     width_in = SENSED_IN
     blocks: list[Block] = []
     image_in = 0.0
@@ -41,7 +41,7 @@ def sensed(moment: Moment, aspect: float) -> Box:
 
 
 def percepts(moment: Moment) -> Box:
-    """What was recognised, the surest first, in the colours of the image."""
+    """Make the box of what was recognised, the surest first, in the colours of the image."""
     width_in = 1.85
     if moment.percepts is None:
         return empty("percepts", width_in, [text.NOT_IN_LOG])
@@ -64,7 +64,7 @@ def percepts(moment: Moment) -> Box:
 
 
 def workspace(moment: Moment) -> Box:
-    """What each phase committed, and whose answers that was."""
+    """Make the box of what each phase committed, and whose answers that was."""
     width_in = 2.15
     blocks: list[Block] = []
     for after_ms, phase, what in text.phases(moment):

@@ -38,13 +38,13 @@ class Forked:
 
     @property
     def pid(self) -> int:
-        """The process id; 0 where it was never started, as the server has ended."""
+        """Return the process id; 0 if it was never started, as the server has ended."""
         while self.started is None and self.code is None:
             self._server.receive(None)
         return self.started or 0
 
     def poll(self) -> int | None:
-        """The exit code; None while it runs."""
+        """Return the exit code; None while it runs."""
         self._server.receive(0.0)
         return self.code
 
@@ -100,7 +100,7 @@ class ForkServer:
 
     @property
     def pid(self) -> int:
-        """The server's own process id."""
+        """Return the server's own process id."""
         return self._process.pid
 
     def fork(self, arguments: Sequence[str], output: int) -> Forked:
@@ -160,7 +160,7 @@ class ForkServer:
 
 
 def fork_server() -> AbstractContextManager[ForkServer | None]:
-    """A fork server, None where forking is not safe: libraries of macOS start threads."""
+    """Start a fork server; None if forking is not safe: libraries of macOS start threads."""
     return ForkServer() if sys.platform == "linux" else nullcontext()
 
 

@@ -70,10 +70,10 @@ class Server:
         self._is_prepared = False
 
     def serve(self) -> list[str] | None:
-        """Fork as requested until `channel` ends: then None, and in each forked process what it was
-        requested to be, the arguments of `cogmap`.
+        """Fork as requested until `channel` ends. Returns None then and, in each forked process,
+        the arguments of `cogmap` that were requested.
 
-        Where no request waits, it imports what later ones may need.
+        While no request waits, it imports what later ones may need.
         """
         gc.disable()
         next(self._steps)
@@ -162,8 +162,8 @@ def _imports(names: Sequence[str]) -> Iterator[None]:
 
 
 def preparation() -> Iterator[None]:
-    """Import all that may be forked, in steps, last what takes longest. Where that fails, the
-    process that needs it names the reason.
+    """Import all that may be forked, in steps, last what takes longest. If that fails, the process
+    that needs it names the reason.
     """
     # It tries the EGL plugin in another process, meanwhile.
     with suppress(Exception):

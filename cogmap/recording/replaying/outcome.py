@@ -28,7 +28,7 @@ class Outcome(msgspec.Struct, kw_only=True):
 
     @property
     def is_same(self) -> bool:
-        """Return if every output of the log was published, with the same bytes."""
+        """Return whether every output of the log was published, with the same bytes."""
         return not (self.different or self.missing_outputs or self.first)
 
 

@@ -18,11 +18,11 @@ class Control(Protocol):
 
     @property
     def asked(self) -> bool:
-        """Return if it is asked to end."""
+        """Return whether it is asked to end."""
 
     @property
     def paused(self) -> bool:
-        """Return if it is asked to stand still."""
+        """Return whether it is asked to stand still."""
 
     def wait(self, timeout_s: float) -> bool:
         """Wait so long, or until asked to end, to pause or to continue. Returns whether to end."""

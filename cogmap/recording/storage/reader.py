@@ -54,7 +54,7 @@ class Record:
 
     @property
     def topic(self) -> Topic:
-        """The row of the table that it travelled on."""
+        """Return the row of the table that it travelled on."""
         return BY_NAME[self.topic_name]
 
 
@@ -101,7 +101,7 @@ class LogReader:
 
     @property
     def span_ns(self) -> tuple[int, int]:
-        """The log times of the first and the last message, (0, 0) where there is none."""
+        """Return the log times of the first and the last message, (0, 0) if there is none."""
         if not self._chunks:
             return 0, 0
         first_ns = min(chunk.first_ns for chunk in self._chunks)
@@ -110,7 +110,7 @@ class LogReader:
 
     @property
     def span_s(self) -> float:
-        """Seconds from the first message to the last."""
+        """Return the seconds from the first message to the last."""
         first_ns, last_ns = self.span_ns
         return (last_ns - first_ns) / 1e9
 
@@ -156,8 +156,8 @@ class LogReader:
     def payload(self, record: Record) -> bytes:
         """Return the bytes of a message, as they travelled.
 
-        Quick where records are asked for roughly in order: the last few chunks are kept. Raises
-        LogError.
+        This is quick if records are asked for roughly in order: the last few chunks are kept.
+        Raises LogError.
         """
         message = self._messages(record.chunk)[record.position]
         data: bytes = message.data

@@ -46,7 +46,7 @@ class Recovery(msgspec.Struct, kw_only=True):
 
     @property
     def whole(self) -> bool:
-        """Return if nothing was wrong with the file."""
+        """Return whether nothing was wrong with the file."""
         return not self.damaged
 
 

@@ -96,7 +96,7 @@ class SequenceTracker:
 
     @property
     def streams(self) -> list[Stream]:
-        """All, by topic, source and incarnation."""
+        """Return all streams, by topic, source and incarnation."""
         return [self._streams[key] for key in sorted(self._streams)]
 
     def gaps(self) -> list[str]:

@@ -52,7 +52,7 @@ class LogWriter:
     ) -> None:
         """Add the message that travelled as `payload` on `topic`.
 
-        Its log time is `received_ns`, or that of the message before where the clock was set back.
+        Its log time is `received_ns`, or that of the message before if the clock was set back.
         """
         log_time_ns = max(self._last_log_ns, layout.time_field(received_ns))
         self._last_log_ns = log_time_ns
@@ -111,7 +111,7 @@ class FlushTimer:
         self._next_s = time.monotonic() + FLUSH_S
 
     def due_in_s(self) -> float:
-        """Seconds until it is time to flush, 0 if it is."""
+        """Return the seconds until it is time to flush, 0 if it is."""
         return max(0.0, self._next_s - time.monotonic())
 
     def reset(self) -> None:
@@ -120,7 +120,7 @@ class FlushTimer:
 
 
 def open_new(path: Path) -> BinaryIO:
-    """Return a new file to write to, in a folder made where there is none. Raises LogError."""
+    """Return a new file to write to, in a folder made if there is none. Raises LogError."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -36,7 +36,7 @@ class Computation:
 
     @property
     def end_ns(self) -> int:
-        """When it ended."""
+        """Return when it ended."""
         return self.start_ns + self.compute_ns
 
 
@@ -104,8 +104,8 @@ class Publisher:
         self.emitted[topic.name] += 1
 
     def compact_journal(self) -> None:
-        """Shorten a journal that has become long. Not between the messages of one reply: what the
-        module restores would be ahead of them.
+        """Shorten a journal that has become long. Never call it between the messages of one reply:
+        what the module restores would be ahead of them.
         """
         journal = self._journal
         compact = self._module.compact
@@ -125,7 +125,7 @@ class Publisher:
         self._bus.publish(topic, encode(restored), envelope)
 
     def send_health(self, health: Health) -> None:
-        """Publish `health`, with the causes that wait for an output where they have become many."""
+        """Publish `health`, with the causes that wait for an output if they have become many."""
         topic = topics.HEALTH
         payload = encode(health)
         envelope = self._envelope(topic, health, health.stamp_ns)

@@ -29,7 +29,7 @@ class Changes:
         self._totals = self._totals.plus(digest)
 
     def remove(self, key: str) -> None:
-        """Remove the record of `key`, where there is one."""
+        """Remove the record of `key`, if there is one."""
         found = self._connection.execute("SELECT digest FROM records WHERE key = ?", (key,))
         for (digest,) in found.fetchall():
             self._connection.execute("DELETE FROM records WHERE key = ?", (key,))

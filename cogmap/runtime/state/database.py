@@ -36,39 +36,39 @@ class Database:
     def put(self, records: Iterable[Record]) -> None:
         """Add `records` in one transaction, each in place of the one that has its key.
 
-        All are on the disk on return, and none where this raises or the process is killed: SQLite
+        All are on the disk on return, and none if this raises or the process is killed: SQLite
         writes the pages as they were to the journal and syncs it, then the journal's head, then the
         pages to the database, and then zeros over the journal's head, which is the commit; it calls
-        fdatasync after each of the four, and more often where they exceed its cache of 2 MB. The
-        first transaction also syncs the folder, in which the journal is new. What the disk reports
-        as synced must be so. To sync the folder where a journal is deleted, at the end, is what
-        synchronous=EXTRA adds.
+        fdatasync after each of the four, and more often if they exceed its cache of 2 MB. The first
+        transaction also syncs the folder, in which the journal is new. What the disk reports as
+        synced must be so. synchronous=EXTRA adds that the folder is synced when a journal in it is
+        deleted, at the end.
         """
         with self._transaction() as changes:
             for record in records:
                 changes.put(record)
 
     def remove(self, keys: Iterable[str]) -> None:
-        """Remove the records of `keys`, where there are such, as durably as they are put."""
+        """Remove the records of `keys`, if there are any, as durably as they are put."""
         with self._transaction() as changes:
             for key in keys:
                 changes.remove(key)
 
     def records(self) -> Iterator[Record]:
-        """Return every record, by the time it was put. Nothing may be put or removed meanwhile."""
+        """Yield every record, by the time it was put. Nothing may be put or removed meanwhile."""
         with named(self._path):
             for record, _ in rows(self._connection, self._path):
                 yield record
 
     @property
     def count(self) -> int:
-        """How many records it has."""
+        """Return how many records it has."""
         with named(self._path):
             return totals(self._connection, self._path).count
 
     @property
     def is_empty(self) -> bool:
-        """True if it has no record."""
+        """Return whether it has no record."""
         return self.count == 0
 
     def close(self) -> None:
@@ -77,7 +77,7 @@ class Database:
 
     @contextmanager
     def _transaction(self) -> Iterator[Changes]:
-        """Changes that are on the disk when the block ends, and undone where it raises."""
+        """Yield changes that are on the disk when the block ends, and are undone if it raises."""
         connection = self._connection
         with named(self._path):
             connection.execute("BEGIN IMMEDIATE")
@@ -98,7 +98,7 @@ class Database:
 def write_new(path: Path, records: Iterable[Record]) -> None:
     """Make a database of `records` at `path`, which is there once it has all of them.
 
-    Nothing is there where `records` raises. Raises StorageError if there is a file already.
+    If `records` raises, nothing is there. Raises StorageError if there is a file already.
     """
     with new_database(path) as made, closing(Database(made)) as database:
         database.put(records)

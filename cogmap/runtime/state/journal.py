@@ -33,7 +33,7 @@ class Journal:
         self._limit = COMPACT_BYTES
 
     def messages(self) -> Iterator[Message]:
-        """Return everything written so far, oldest first.
+        """Yield everything written so far, oldest first.
 
         Raises UsageError at a whole record that cannot be decoded.
         """
@@ -53,7 +53,7 @@ class Journal:
         os.ftruncate(self._file, self._size)
 
     def _body_at(self, offset: int) -> tuple[int, bytes] | None:
-        """The length of the topic's name, then name and payload; None if no whole record is."""
+        """Read the length of the topic's name, then name and payload; None if none is whole."""
         head = os.pread(self._file, HEAD.size, offset)
         if len(head) < HEAD.size:
             return None
@@ -75,12 +75,12 @@ class Journal:
 
     @property
     def is_empty(self) -> bool:
-        """True if there was nothing to read, and nothing has been written."""
+        """Return whether there was nothing to read, and nothing has been written."""
         return self._size == 0
 
     @property
     def is_long(self) -> bool:
-        """True if it is time to compact it."""
+        """Return whether it is time to compact it."""
         return self._size > self._limit
 
     def compact(self, message: Message) -> None:

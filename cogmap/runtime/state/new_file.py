@@ -13,11 +13,11 @@ from cogmap.errors import StorageError
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """Where to write a file that is to be at `path`, in a folder of its own beside it.
+    """Yield where to write a file that is to be at `path`: in a folder of its own beside it.
 
-    Once the block has ended it is at `path`, whole and on the disk; nothing is there where the
-    block raises or the process is killed. Raises StorageError if there is a file already, which
-    stays, and where the disk refuses.
+    When the block has ended, the file is at `path`, whole and on the disk. If the block raises or
+    the process is killed, nothing is there. Raises StorageError if there is a file already, which
+    stays, and if the disk refuses.
     """
     if path.exists():
         raise StorageError(f"{path} exists already: move it away, or name another file")

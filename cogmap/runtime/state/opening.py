@@ -26,9 +26,9 @@ PRAGMAS = (
 
 @contextmanager
 def new_database(path: Path) -> Iterator[Path]:
-    """Where to make a database that is to be at `path`, as `new_file` does: it has no record yet.
+    """Yield where to make a database that is to be at `path`, as `new_file` does: it has no record.
 
-    A rollback journal that waits for it is refused, for SQLite would write that into it. Raises
+    A rollback journal that waits for it is refused, as SQLite would write that into it. Raises
     StorageError.
     """
     journal = path.with_name(f"{path.name}-journal")
@@ -47,7 +47,7 @@ def opened(path: Path, progress: Progress) -> sqlite3.Connection:
     undamaged.
 
     A transaction that a killed process has left is rolled back first. The file is read through
-    SQLite alone, for closing another descriptor of it would drop its locks. Raises StorageError.
+    SQLite alone, as closing another descriptor of it would drop its locks. Raises StorageError.
     """
     if path.is_file() and path.stat().st_size == 0:
         raise damaged(path, "it is empty")
@@ -78,7 +78,7 @@ def opened(path: Path, progress: Progress) -> sqlite3.Connection:
 
 
 def rows(connection: sqlite3.Connection, path: Path) -> Iterator[tuple[Record, bytes]]:
-    """Records with their digests, by sequence number. Raises StorageError at one that is damaged.
+    """Yield records with their digests, by sequence number. Raises StorageError at a damaged one.
 
     SQLite keeps no types, so they are checked as well.
     """
@@ -104,7 +104,7 @@ def totals(connection: sqlite3.Connection, path: Path) -> Totals:
 
 
 def _check(connection: sqlite3.Connection, path: Path, progress: Progress) -> None:
-    """Whose it is, its version, its pages, its tables, its records. Raises StorageError."""
+    """Check whose it is, its version, its pages, its tables, its records. Raises StorageError."""
     ((owner,),) = connection.execute("PRAGMA application_id")
     if owner != schema.APPLICATION_ID:
         raise StorageError(

@@ -66,7 +66,7 @@ class PublishedCounts:
 
     @property
     def _size(self) -> int:
-        """The bytes of the records that are in the file."""
+        """Return how many bytes the records in the file take."""
         return len(self._slots) * RECORD.size
 
     def close(self) -> None:

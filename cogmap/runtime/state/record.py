@@ -19,7 +19,7 @@ class Record(NamedTuple):
 
 
 def digest_of(record: Record, sequence: int) -> bytes:
-    """BLAKE2b of key, sequence number, kind and payload, each with its length before it.
+    """Return BLAKE2b of key, sequence number, kind and payload, each with its length before it.
 
     It has DIGEST_BYTES bytes. Raises UnicodeEncodeError if key or kind is no text.
     """
@@ -44,11 +44,11 @@ class Totals:
     combined: bytes = bytes(DIGEST_BYTES)
 
     def plus(self, digest: bytes) -> Totals:
-        """With one more record."""
+        """Return the totals with one more record."""
         return Totals(self.count + 1, self._combined_with(digest))
 
     def minus(self, digest: bytes) -> Totals:
-        """Without a record that is among them."""
+        """Return the totals without a record that is among them."""
         return Totals(self.count - 1, self._combined_with(digest))
 
     def _combined_with(self, digest: bytes) -> bytes:

@@ -35,8 +35,8 @@ SAME_M = 12.0
 
 
 def blocked_places(scan: Array, agent: Self, graph: Graph) -> list[str]:
-    """The ids of the place nodes at which rays of a scan end across a lane that the agent counts
-    on: the nearest of the plan's route, and the nearest of where it drove.
+    """Return the ids of the place nodes at which rays of a scan end across a lane that the agent
+    counts on: the nearest of the plan's route, and the nearest of where it drove.
     """
     rays = np.asarray(scan.numpy(), np.float64)
     cell_m = graph.cell_m(agent.map)
@@ -56,8 +56,8 @@ def blocked_places(scan: Array, agent: Self, graph: Graph) -> list[str]:
 
 
 def expected_by(place: str, graph: Graph) -> str:
-    """The id of what counted on a place node that is blocked: the plan, if its route leads past
-    there, else the agent, which drove there.
+    """Return the id of what counted on a place node that is blocked: the plan, if its route leads
+    past there, else the agent, which drove there.
     """
     plan = graph.get(Plan, PLAN_ID)
     cell = place_cell(place)
@@ -83,8 +83,8 @@ def is_known(place: str, noted: Mapping[str, int], since_cycle: int, cell_m: flo
 
 
 def _is_blocked(lane: Lane, rays: Floats, agent: Self) -> Booleans:
-    """(n,): the places at which most of the rays (k, 2), bearing and range each, that lead there
-    end, across the lane.
+    """Decide for each place of a lane, (n,), whether most of the rays (k, 2), bearing and range
+    each, that lead there end there, across the lane.
     """
     bearing_rad, range_m = rays.T
     away_m, slant_rad, lane_rad = _as_seen(lane, agent)
@@ -114,8 +114,8 @@ def _is_blocked(lane: Lane, rays: Floats, agent: Self) -> Booleans:
 
 
 def _as_seen(lane: Lane, agent: Self) -> tuple[Floats, Floats, Floats]:
-    """(n,) each: how far away the places of a lane are, by how much the lane there is aslant to the
-    line of sight, and their bearings.
+    """Compute how far away the places of a lane are, how much the lane there is aslant to the line
+    of sight, and their bearings, (n,) each.
     """
     offset_m = lane.position_m - (agent.x_m, agent.y_m)
     direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])

@@ -25,8 +25,8 @@ def coalition(
     percepts: Iterable[Percept] = (),
     feeling: Feeling = Feeling.NONE,
 ) -> Coalition:
-    """A coalition of `nodes`, with their links to places and `links`, the maps they are on, how
-    those among `percepts` stand to the agent, and the `feeling` about it.
+    """Make a coalition of `nodes`, with their links to places and `links`, the maps they are on,
+    how those among `percepts` stand to the agent, and the `feeling` about it.
 
     Its activation is sum(total activation + |incentive salience|) / 2n over its n nodes and links,
     as in LIDA's framework; the base level of attention codelets, by which LIDA multiplies that, is
@@ -77,13 +77,13 @@ def coalition(
 
 
 def felt(node: AnyNode, salience: float) -> AnyNode:
-    """A node with a feeling attached to it."""
+    """Attach a feeling to a node."""
     return msgspec.structs.replace(node, salience=salience)
 
 
 def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
-    """The objects of the map that are in view, by label, each as salient as its percept if that
-    is more than what is felt about it in the graph.
+    """Return the objects of the map that are in view, by label, each as salient as its percept if
+    that is more than what is felt about it in the graph.
     """
     saliences = {object_id(percept.label): percept.salience for percept in percepts}
     objects = []
@@ -95,8 +95,8 @@ def objects_in_view(percepts: list[Percept], graph: Graph) -> list[Object]:
 
 
 def _as_of_now(node: AnyNode, graph: Graph) -> AnyNode:
-    """The node with its activation in this cycle, the mean of its samples in place of them all, and
-    without a route: the global workspace broadcasts no more than that.
+    """Return the node with its activation in this cycle, the mean of its samples in place of them
+    all, and without a route: the global workspace broadcasts no more than that.
     """
     now = {
         "activation": graph.activation(node),

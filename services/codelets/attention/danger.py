@@ -46,7 +46,7 @@ def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
-    """A coalition of the self and the nearest object in view, by which the place is known again."""
+    """Bring a coalition of the self and the nearest object in view, to know the place again by."""
     agent = graph.agent
     if agent is None:
         return Answer()

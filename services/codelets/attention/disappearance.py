@@ -45,9 +45,9 @@ MAX_OBJECTS = 300
 def missing_objects(
     task: Task, agent: Self, graph: Graph, established_sightings: int
 ) -> dict[str, int]:
-    """The objects seen in so many views, by id, that `agent` should see in the view of `task` and
-    does not, with how much that counts: the range scan passes where they stood, or nothing that is
-    known hides them. None while its position is uncertain.
+    """Find the objects seen in so many views that `agent` should see in the view of `task` and does
+    not. Return by id how much that counts: the range scan passes where they stood, or nothing that
+    is known hides them. Find none while the agent's position is uncertain.
     """
     if task.scan is None or math.hypot(agent.x_sd_m, agent.y_sd_m) > MAX_SD_M:
         return {}
@@ -82,7 +82,7 @@ def missing_objects(
 
 
 def _at_places_ahead(agent: Self, graph: Graph, half_view_rad: float) -> Iterator[str]:
-    """The ids of what is linked to a place node inside the view, or a cell beside it."""
+    """Yield the ids of what is linked to a place node inside the view, or a cell beside it."""
     cell_m = graph.cell_m(agent.map)
     here = np.array([agent.x_m, agent.y_m])
     reach = math.ceil(FARTHEST_M / cell_m) + 1
@@ -103,9 +103,9 @@ def _at_places_ahead(agent: Self, graph: Graph, half_view_rad: float) -> Iterato
 
 
 def _absence(node: Object, agent: Self, rays: Floats, around: Iterable[Object]) -> int:
-    """PASSED if the rays (n, 2), bearing and range each, pass where an object stood; UNSEEN if they
-    end well before it, and perception would see it, as nothing that is known hides it: what is low
-    stops rays and hides no building. Else 0: what they hit there may be the object.
+    """Return PASSED if the rays (n, 2), bearing and range each, pass where an object stood; UNSEEN
+    if they end well before it, and perception would see it, as nothing that is known hides it: low
+    things stop rays and hide no building. Else return 0: what they hit there may be the object.
     """
     away_m = math.dist((node.x_m, node.y_m), (agent.x_m, agent.y_m))
     half_rad = math.atan2(MIDDLE_SHARE * node.width_m / 2, away_m)

@@ -29,7 +29,7 @@ def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
-    """A coalition of the self and the most active episode, as salient as that is."""
+    """Bring a coalition of the self and the most active episode, as salient as that is."""
     agent = graph.agent
     recalled = recalled_episodes(graph)
     if agent is None or not recalled:
@@ -51,5 +51,5 @@ CODELET = Codelet(
 
 
 def recalled_episodes(graph: Graph) -> list[nodes.Episode]:
-    """The episodes whose activation has not decayed since they were recalled, by id."""
+    """Return the episodes whose activation has not decayed since they were recalled, by id."""
     return [node for node in graph.of_kind(nodes.Episode) if graph.activation(node) > 0.0]

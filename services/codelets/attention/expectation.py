@@ -66,9 +66,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Meta(
             ge=1,
             le=10_000,
-            description="Views in which an object is missing, since it was seen last, before "
-            "that is a surprise, 1 to 10000: perception misses one of twenty. Half as many do in "
-            "which the rays of the range scan pass where it stood.",
+            description="Views in which an object is missing, since it was seen last, before that "
+            "is a surprise: perception misses one of twenty. Half as many do in which "
+            "the rays of the range scan pass where it stood.",
         ),
     ] = 4
     established_sightings: Annotated[
@@ -76,7 +76,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Meta(
             ge=1,
             le=10_000,
-            description="Views in which an object was seen that is expected, 1 to 10000.",
+            description="Views in which an object was seen that is expected.",
         ),
     ] = 10
 
@@ -94,7 +94,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """A coalition of the self and what is not as expected, until it was conscious."""
+    """Bring a coalition of the self and what is not as expected, until it was conscious."""
     agent = graph.agent
     if agent is None:
         return Answer()
@@ -141,8 +141,8 @@ CODELET = Codelet(
 def _with_missing(
     memory: Attention, task: Task, agent: Self, graph: Graph, config: Config
 ) -> Attention:
-    """`memory`, with the number of views in which each object was missing since it was seen last,
-    or the agent was far from it. Those are pending that reach the number that is a surprise.
+    """Count in `memory` the views in which each object was missing since it was seen last, or the
+    agent was far from it. Objects that reach the number that is a surprise become pending.
     """
     in_view = {object_id(percept.label) for percept in task.percepts}
     missing = missing_objects(task, agent, graph, config.established_sightings)
@@ -169,8 +169,8 @@ def _with_missing(
 
 
 def _with_blocked(memory: Attention, task: Task, agent: Self, graph: Graph) -> Attention:
-    """`memory`, in which places that two views in short order show blocked are noted with their
-    cycle, and pending, unless a blockage near them is known already.
+    """Note in `memory` the places that two views shortly after each other show blocked, with their
+    cycle. They become pending, unless a blockage near them is known already.
     """
     if task.scan is None:
         raise MessageError(f"task {task.task_id}: no range scan")

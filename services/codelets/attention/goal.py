@@ -57,7 +57,7 @@ def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
-    """A coalition of the self, the plan and its next goal, and the goals that were reached."""
+    """Bring a coalition of the self, the plan and its next goal, and the goals reached."""
     agent = graph.agent
     plan = graph.get(Plan, PLAN_ID)
     if agent is None:
@@ -106,7 +106,7 @@ CODELET = Codelet(
 
 
 def _state(graph: Graph) -> dict[str, int]:
-    """When the plan was made, and when each goal was reached, by id."""
+    """Return when the plan was made, and when each goal was reached, by id."""
     state = {}
     plan = graph.get(Plan, PLAN_ID)
     if plan is not None:

@@ -32,13 +32,13 @@ class Lane(NamedTuple):
     heading_rad: Floats
 
     def where(self, is_kept: Booleans) -> Lane:
-        """Those of the places for which that is so, (n,)."""
+        """Keep the places for which `is_kept`, (n,), is true."""
         return Lane(self.position_m[is_kept], self.heading_rad[is_kept])
 
 
 def lanes(agent: Self, graph: Graph) -> list[Lane]:
-    """The straight parts of the plan's route ahead, where it was seen to be road, and of the path
-    that the agent drove.
+    """Return the straight parts of the plan's route ahead, where it was seen to be road, and of the
+    path that the agent drove.
     """
     path = rows_of(graph.path)
     driven = Lane(path[:, POSITION], path[:, PathColumn.HEADING_RAD])
@@ -72,7 +72,7 @@ def lanes(agent: Self, graph: Graph) -> list[Lane]:
 
 
 def _is_straight(lane: Lane) -> Booleans:
-    """(n,): at which of its places a lane is straight."""
+    """Decide at which of its places a lane is straight, (n,)."""
     along_m = distances_along(lane.position_m)
     is_straight = np.ones(len(along_m), bool)
     for away_m in STRAIGHT_M:

@@ -63,8 +63,8 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """A coalition of the self, the needs that are high, each as bad as its level if it has no
-    salience of its own, and the nearest object that satisfies each.
+    """Bring a coalition of the self, the needs that are high, and the nearest object that satisfies
+    each. A need that has no salience of its own is as bad as its level.
     """
     high = high_needs(graph, config)
     agent = graph.agent
@@ -95,13 +95,13 @@ CODELET = Codelet(
 
 
 def high_needs(graph: Graph, config: Config) -> list[nodes.Need]:
-    """The needs that are high, by id."""
+    """Return the needs that are high, by id."""
     return [node for node in graph.of_kind(nodes.Need) if node.level >= config.high_level]
 
 
 def nearest_that_satisfies(need: nodes.Need, agent: Self, graph: Graph) -> Object | None:
-    """The object of the agent's map that satisfies a need, as far as is known, and is the nearest
-    but for one that the plan has found no route to; None if none is known.
+    """Find the nearest object of the agent's map that satisfies a need, as far as is known, except
+    one that the plan has found no route to; None if none is known.
     """
     function = SATISFIED_BY.get(need.label)
     found = [node for node in graph.of_kind(Object) if node.function == function]

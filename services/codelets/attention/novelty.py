@@ -29,8 +29,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Meta(
             ge=1,
             le=10_000,
-            description="Views in which an object has been seen at most while it is new, 1 to "
-            "10000.",
+            description="Views in which an object has been seen at most while it is new.",
         ),
     ] = 5
 
@@ -50,7 +49,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """A coalition of the self and the novel objects in view."""
+    """Bring a coalition of the self and the novel objects in view."""
     novel = novel_objects(task.percepts, graph, config)
     if not novel or graph.agent is None:
         return Answer()
@@ -73,7 +72,7 @@ CODELET = Codelet(
 
 
 def novel_objects(percepts: list[Percept], graph: Graph, config: Config) -> list[Object]:
-    """The objects in view that were seen in few views, each as salient as it was seen little."""
+    """Return the objects in view that were seen in few views: the fewer, the more salient."""
     found = []
     for node in objects_in_view(percepts, graph):
         if node.sightings <= config.novel_sightings:

@@ -38,7 +38,7 @@ def is_refractory(
 
 
 def without_conscious(memory: Attention) -> Attention:
-    """`memory`, in which nothing is pending that was brought and broadcast since."""
+    """Drop from what is pending in `memory` all that was brought and has been broadcast since."""
     pending = {}
     for name, brought_cycle in memory.pending.items():
         was_broadcast = 0 < brought_cycle <= memory.conscious_cycle
@@ -49,20 +49,20 @@ def without_conscious(memory: Attention) -> Attention:
 
 
 def with_pending(memory: Attention, names: Iterable[str]) -> Attention:
-    """`memory`, in which `names` are pending too."""
+    """Add `names` to what is pending in `memory`."""
     added = dict.fromkeys(names, 0)
     return msgspec.structs.replace(memory, pending=memory.pending | added)
 
 
 def brought(memory: Attention, found: Coalition, cycle: int, graph: Graph) -> Answer:
-    """A coalition about all that is pending, and what the codelet keeps of it."""
+    """Answer with a coalition about all that is pending, and what the codelet keeps of it."""
     pending = dict.fromkeys(memory.pending, cycle)
     after = msgspec.structs.replace(memory, brought_cycle=cycle, pending=pending)
     return kept(after, graph, [found])
 
 
 def kept(memory: Attention, graph: Graph, found: Iterable[Coalition] = ()) -> Answer:
-    """Coalitions, and what the codelet keeps, if that is new."""
+    """Answer with coalitions, and what the codelet keeps, if that is new."""
     answer = Answer(coalitions=list(found))
     if memory != graph.nodes.get(memory.id):
         answer.operations.append(memory)

@@ -26,9 +26,7 @@ LOST = "lost"
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
-    """Return one task while the agent is lost, and until consciousness has it that it is found
-    again.
-    """
+    """Return one task while the agent is lost, and until it is conscious that it is found again."""
     agent = graph.agent
     if agent is None:
         return []
@@ -44,8 +42,8 @@ def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
-    """A coalition of the self, and of the landmark that did not fit first while it is lost: it is
-    bad to be lost, and good to be found.
+    """Bring a coalition of the self and, while it is lost, of the landmark that did not fit first:
+    it is bad to be lost, and good to be found.
     """
     agent = graph.agent
     if agent is None:

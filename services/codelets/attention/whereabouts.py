@@ -23,7 +23,7 @@ def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
-    """A coalition of the self and the objects in view."""
+    """Bring a coalition of the self and the objects in view."""
     nodes: list[AnyNode] = []
     if graph.agent is not None:
         nodes.append(graph.agent)

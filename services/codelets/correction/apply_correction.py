@@ -68,7 +68,7 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
 
 
 def moved(graph: Graph, rows: Floats) -> list[Operation]:
-    """Everything on the root map, moved as (n, 7) rows of a correction state."""
+    """Move everything on the root map as (n, 7) rows of a correction state."""
     # Each place of the path moves with the first row that is not before it.
     path = rows_of(graph.of_kind(PathSegment))
     following = np.searchsorted(rows[:, STAMP], path[:, STAMP]).clip(0, len(rows) - 1)
@@ -113,7 +113,7 @@ CODELET = Codelet(
 
 
 def _moved_poses(poses: Floats, rows: Floats) -> Floats:
-    """(n, 3) poses, each moved as a row of the correction is."""
+    """Move (n, 3) poses, each as a row of the correction is moved."""
     old = rows[:, OLD]
     new = rows[:, NEW]
     positions_m = move_with(poses[:, :2], old, new)
@@ -125,9 +125,9 @@ def _moved_poses(poses: Floats, rows: Floats) -> Floats:
 
 
 def _move_objects(graph: Graph, rows: Floats, path: Floats) -> list[Operation]:
-    """The objects that move, but for those that were surveyed: to where they are seen from the
-    corrected `path`; or if they were not observed along it, with the place nearest to them, of
-    those from which they came to be known.
+    """Move the objects, except those that were surveyed, to where they are seen from the corrected
+    `path`. If they were not observed along it, move them with the place nearest to them, of those
+    from which they came to be known.
     """
     seen = Sightings.of(graph.of_kind(Observations), path[:, STAMP])
     landmarks_m = dict(zip(seen.labels, seen.landmarks_m(path[:, POSE]), strict=True))
@@ -156,7 +156,7 @@ def _move_objects(graph: Graph, rows: Floats, path: Floats) -> list[Operation]:
 
 
 def _move_maps(graph: Graph, rows: Floats) -> list[Operation]:
-    """The frames of the root map's sub-maps move; those of their own sub-maps are in theirs."""
+    """Move the frames of the root map's sub-maps; sub-maps in these move along."""
     operations: list[Operation] = []
     for node in graph.of_kind(Map):
         if node.parent != ROOT_MAP or is_coarse_map(node.id):
@@ -177,7 +177,7 @@ def _move_maps(graph: Graph, rows: Floats) -> list[Operation]:
 
 
 def _row_of(node: Object, mean_m: Floats, rows: Floats) -> Floats:
-    """(1, 7): the row of the correction that an object moves with."""
+    """Find the row of the correction that an object moves with, (1, 7)."""
     since_s = node.created_ns * 1e-9
     stamps_s = rows[:, STAMP]
     known = rows[(stamps_s >= since_s) & (stamps_s <= node.last_seen_ns * 1e-9)]

@@ -34,7 +34,7 @@ class Joining(NamedTuple):
     into: Indices
 
     def preceded(self, rows: Floats) -> Joining:
-        """The same with (m, COLUMNS) places before, which stay."""
+        """Add (m, COLUMNS) places before the others; they stay."""
         stay = np.full(len(rows), STAYS)
         return self._replace(
             places=np.vstack([rows, self.places]), into=np.concatenate([stay, self.into])
@@ -42,13 +42,13 @@ class Joining(NamedTuple):
 
     @property
     def stays(self) -> Booleans:
-        """(n,): which places stay."""
+        """Return which places stay, (n,)."""
         stays: Booleans = self.into == STAYS
         return stays
 
     @property
     def poses(self) -> Floats:
-        """(n, 3): the pose of what each place becomes."""
+        """Return the (n, 3) poses of what the places become."""
         poses = self.places[:, POSE].copy()
         is_joined = ~self.stays
         poses[is_joined] = self.known[self.into[is_joined]][:, POSE]
@@ -56,7 +56,7 @@ class Joining(NamedTuple):
 
     @property
     def stamps_s(self) -> Floats:
-        """(n,): the stamp of what each place becomes."""
+        """Return the (n,) stamps of what the places become."""
         stamps_s = self.places[:, STAMP].copy()
         is_joined = ~self.stays
         stamps_s[is_joined] = self.known[self.into[is_joined], STAMP]
@@ -64,7 +64,7 @@ class Joining(NamedTuple):
 
     @property
     def offsets(self) -> Floats:
-        """(n, 3): each place in the frame of what it becomes."""
+        """Return each place in the frame of what it becomes, (n, 3)."""
         return relative(self.poses, self.places[:, POSE])
 
 
@@ -88,8 +88,8 @@ def joining(known: Floats, places: Floats, config: Config) -> Joining:
 
 
 def left(joined: Joining) -> tuple[Floats, float]:
-    """(m, COLUMNS): the places that stay, each with the number of those joined since the one
-    before; and the number of those after the last.
+    """Return the places that stay, (m, COLUMNS), each with the number of those joined since the one
+    before; and the number of those joined after the last.
     """
     rows = []
     count = 0.0
@@ -108,7 +108,7 @@ def left(joined: Joining) -> tuple[Floats, float]:
 
 
 def visited(joined: Joining) -> Floats:
-    """(k, COLUMNS): the known places, each with the time when the agent was there last."""
+    """Return the known places, (k, COLUMNS), each with the time when the agent was there last."""
     known = joined.known.copy()
     is_joined = ~joined.stays
     np.maximum.at(known[:, LAST], joined.into[is_joined], joined.places[is_joined, LAST])
@@ -116,8 +116,8 @@ def visited(joined: Joining) -> Floats:
 
 
 def joins(joined: Joining, config: Config) -> Floats:
-    """(m, 7): the steps of path integration, in the columns of JoinColumn, from a place that stays
-    to one that does not or back, between what these become.
+    """Compute the steps of path integration, (m, 7) in the columns of JoinColumn, from a place that
+    stays to one that does not or back, between what these become.
     """
     steps = steps_of(joined.places, config)
     before = joined.offsets[:-1]

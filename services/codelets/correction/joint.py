@@ -21,8 +21,8 @@ CORRELATED = 5.0
 
 
 def optimize_jointly(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
-    """(n, 3) poses with the loops of `graph` closed, and bound to what was seen along the path, and
-    how often the whole path was solved for that.
+    """Close the loops of `graph`, and bind its poses to what was seen along the path. Return the
+    (n, 3) poses, and how often the whole path was solved for that.
 
     Where a landmark seems to be depends on the side that it is seen from: of a building the front
     is measured, and its depth assumed. So each of its sides is taken for a landmark of its own,
@@ -51,8 +51,8 @@ def optimize_jointly(graph: PoseGraph, seen: Sightings, config: Config) -> tuple
 def with_landmarks(
     graph: PoseGraph, seen: Sightings, landmarks_m: Floats, correlated: float = 1.0
 ) -> PoseGraph:
-    """`graph` with (k, 2) landmarks as poses after those of the path, bound to it by sightings of
-    which `correlated` count as one.
+    """Add (k, 2) landmarks to `graph`, as poses after those of the path, bound to it by sightings
+    of which `correlated` count as one.
     """
     headings_rad = np.zeros(len(landmarks_m))
     landmarks = np.column_stack([landmarks_m, headings_rad])
@@ -68,8 +68,8 @@ def with_landmarks(
 
 
 def by_side(seen: Sightings, poses: Floats, sides: int) -> Sightings:
-    """The same sightings with a landmark for each of so many sides, by the direction in which the
-    landmark is seen in the world.
+    """Divide each landmark into one for each of so many sides, by the direction in which it is seen
+    in the world.
     """
     forward_m, left_m = seen.where_m.T
     direction_rad = poses[seen.place, 2] + np.arctan2(left_m, forward_m)

@@ -232,8 +232,8 @@ def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config)
 
 
 def _start(poses: Floats, steps: Constraints) -> Floats:
-    """(n, 3) poses to correct from: those believed, but for steps that path integration makes
-    impossible, which are its own. Beliefs of an agent that was lost for a while would mislead the
+    """Return the (n, 3) poses to correct from: those believed, but path integration's own for steps
+    that it makes impossible. Beliefs of an agent that was lost for a while would mislead the
     optimization for good.
     """
     believed = residuals(poses, steps)
@@ -247,8 +247,9 @@ def _start(poses: Floats, steps: Constraints) -> Floats:
 
 
 def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
-    """(n, 3) poses with all loops closed, by the paper's rule or with the headings, and how often
-    the whole path was replayed for that: reverse replays of eq. 9, or solutions with the headings.
+    """Close all loops, by the paper's rule or with the headings. Return the (n, 3) poses, and how
+    often the whole path was replayed for that: reverse replays of eq. 9, or solutions with the
+    headings.
 
     Without loops, the path is as path integration has it. With the headings, the path is also bound
     to what was seen along it.

@@ -39,11 +39,11 @@ class Movement:
         self._tree = cKDTree(old[:, :2])
 
     def back(self) -> Movement:
-        """The movement from the new poses to the old ones."""
+        """Return the movement from the new poses to the old ones."""
         return Movement(self._new, self._old, self._cell_m)
 
     def moved(self, positions: Floats) -> tuple[Floats, Floats]:
-        """(k, 2) positions moved, and by how much each is turned, (k,)."""
+        """Move (k, 2) positions. Return them, and by how much each is turned, (k,)."""
         points_m = positions * self._cell_m
         _, nearest = self._tree.query(points_m)
         before = self._old[nearest]
@@ -60,11 +60,11 @@ class CellLinks(NamedTuple):
     cells: Indices
 
     def keys(self) -> Indices:
-        """(k,): a number for each link."""
+        """Return a number for each link, (k,)."""
         return _keys(self.cells) * _DIRECTIONS + self.direction
 
     def moved(self, movement: Movement) -> CellLinks:
-        """The links nearest to where these move to."""
+        """Find the links nearest to where these move to."""
         offsets = LINK_OFFSETS[self.direction]
         middles, turned_rad = movement.moved(self.cells + offsets / 2)
 
@@ -77,7 +77,7 @@ class CellLinks(NamedTuple):
         return CellLinks(direction, cells.astype(np.int64))
 
     def neighbourhood(self) -> CellLinks:
-        """These links and those of their direction in the eight cells around, once each."""
+        """Return these links and those of their direction in the eight cells around, once each."""
         cells = self.cells[:, None, :] + NEIGHBOURHOOD
         direction = np.repeat(self.direction, len(NEIGHBOURHOOD))
         links = CellLinks(direction, cells.reshape(-1, 2))
@@ -85,7 +85,7 @@ class CellLinks(NamedTuple):
 
     @classmethod
     def of(cls, keys: Indices) -> CellLinks:
-        """The links with these numbers."""
+        """Return the links with these numbers."""
         cell_keys, direction = np.divmod(keys, _DIRECTIONS)
         return cls(direction, _cells(cell_keys))
 
@@ -99,7 +99,7 @@ class Known:
         self._values = values[order]
 
     def values_at(self, keys: Indices) -> Floats:
-        """(k,): the values at these numbers."""
+        """Return the values at these numbers, (k,)."""
         last = len(self.keys) - 1
         place = np.searchsorted(self.keys, keys).clip(0, last)
         is_known = self.keys[place] == keys
@@ -119,7 +119,7 @@ class Merged(NamedTuple):
 
     @classmethod
     def of(cls, known: Known, around: Indices, arrived: Indices) -> Merged:
-        """Those that are known, those around and those where something arrives."""
+        """Merge those that are known, those around and those where something arrives."""
         every = np.concatenate([known.keys, around, arrived])
         keys, place = np.unique(every, return_inverse=True)
         ends = np.cumsum([len(known.keys), len(around)])
@@ -208,19 +208,19 @@ def _move_links(graph: Graph, movement: Movement) -> Iterator[Operation]:
 
 
 def _nearest_cells(movement: Movement, cells: Indices) -> Indices:
-    """(k, 2): the cells nearest to where the middles of (k, 2) cells move to."""
+    """Find the cells nearest to where the middles of (k, 2) cells move to, (k, 2)."""
     moved, _ = movement.moved(cells.astype(np.float64))
     return np.rint(moved).astype(np.int64)
 
 
 def _keys(cells: Indices) -> Indices:
-    """(k,): a number for each of (k, 2) cells."""
+    """Compute a number for each of (k, 2) cells, (k,)."""
     keys: Indices = cells[:, 0] * _KEY_STEP + cells[:, 1]
     return keys
 
 
 def _cells(keys: Indices) -> Indices:
-    """(k, 2): the cells with these numbers."""
+    """Return the (k, 2) cells with these numbers."""
     half = _KEY_STEP // 2
     j = (keys + half) % _KEY_STEP - half
     i = (keys - j) // _KEY_STEP

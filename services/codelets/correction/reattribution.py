@@ -34,9 +34,9 @@ from cogmap.services.codelets.nodes import nodes_of
 def observations_left(
     graph: Graph, segment: str, joined: Joining, numbers: Indices
 ) -> list[Operation]:
-    """The observations along the path segment of that id without those from its joined places,
-    which are from the known places then, (k,) `numbers` being the segments of these. A place keeps
-    its first observation of each landmark.
+    """Move the observations from the joined places of the path segment of that id to the known
+    places, in the segments `numbers`, (k,); the others stay. A place keeps its first observation of
+    each landmark.
     """
     operations: list[Operation] = []
     moved: defaultdict[tuple[int, str], list[Floats]] = defaultdict(list)
@@ -90,11 +90,11 @@ def observations_left(
 
 
 def closures_left(closures: Sequence[LoopClosure], ends: Views, joined: Joining) -> list[Operation]:
-    """Return what becomes of loop closures, the places of whose `ends` are counted from the first
-    of the joined ones on.
+    """Return what becomes of loop closures, given the places of their `ends`, counted from the
+    first of the joined ones on.
 
-    Of those to these places the accepted ones to places that stay are left. Those from a joined
-    place are from what that becomes.
+    Of the closures to these places, those are left that were accepted and lead to a place that
+    stays. A closure from a joined place becomes one from what that place becomes.
     """
     count = len(joined.into)
     offsets = joined.offsets

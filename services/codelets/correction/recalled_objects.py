@@ -32,8 +32,8 @@ POSITION = slice(RecalledColumn.X_M, RecalledColumn.Y_M + 1)
 
 
 def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list[Operation]:
-    """The recalled objects, where they stand in the recalled map's frame, in which the root map's
-    has that `pose`. One that is known here keeps its label; others get one that is free.
+    """Add the recalled objects where they stand in the recalled map's frame, in which the root
+    map's has that `pose`. One that is known here keeps its label; others get one that is free.
     """
     known = [node for node in graph.of_kind(Object) if node.map == ROOT_MAP]
     positions_m = np.array([(node.x_m, node.y_m) for node in known]).reshape(-1, 2)

@@ -18,11 +18,11 @@ from cogmap.services.codelets.sub_maps.members import next_number, sub_maps_of
 def recalled_sub_maps(
     recalled: Recollection, objects: Sequence[Object], graph: Graph, pose: Floats
 ) -> list[Operation]:
-    """The recalled map's sub-maps with their objects, which are `objects` here, in its own order;
-    in its frame, the root map's has that `pose`.
+    """Add the recalled map's sub-maps with their objects, which are `objects` here, in the same
+    order; in the recalled map's frame, the root map's has that `pose`.
 
-    What this run has found of sub-maps keeps the objects that were not recalled, under a number
-    that is free.
+    Sub-maps that this run has found keep the objects that were not recalled, under a number that is
+    free.
     """
     if not recalled.sub_maps:
         return []

@@ -90,8 +90,8 @@ CODELET = Codelet(
 def _path_left(
     path: list[PathSegment], number: int, joined: Joining, config: Config
 ) -> list[Operation]:
-    """The segments of `path` that change where places of that `number` are joined into those of the
-    ones before.
+    """Return the segments of `path` that change if places of the segment `number` are joined into
+    places of the segments before it.
     """
     before = path[:number]
     rows, count_after = left(joined)
@@ -124,7 +124,7 @@ def _path_left(
 
 
 def _with_joins(segment: PathSegment, rows: Floats) -> PathSegment:
-    """The segment with (m, 7) joins more."""
+    """Add (m, 7) joins to the segment."""
     if not len(rows):
         return segment
     if segment.joins is not None:

@@ -17,8 +17,8 @@ DECAY_PER_M = 0.2
 
 
 def replay_of(rows: Floats, poses: Floats, loops: Constraints) -> Replay:
-    """The replay of a correction of path `rows` to (n, 3) `poses`: the newest place first, to where
-    the loops begin. It is of no cycle yet, and names no closures.
+    """Make the replay of a correction of path `rows` to (n, 3) `poses`: the newest place first, to
+    where the loops begin. It is of no cycle yet, and names no closures.
     """
     first = int(min(loops.i.min(), loops.j.min())) if len(loops) else 0
     before = rows[first:][::-1]
@@ -56,7 +56,7 @@ def replay_of(rows: Floats, poses: Floats, loops: Constraints) -> Replay:
 
 
 def _strengths(positions_m: Floats, pairs: Indices) -> Floats:
-    """(m,): the synaptic strengths of pairs of place cells."""
+    """Compute the synaptic strengths of pairs of place cells, (m,)."""
     apart_m = positions_m[pairs[:, 0]] - positions_m[pairs[:, 1]]
     strengths: Floats = np.exp(-DECAY_PER_M * np.hypot(*apart_m.T))
     return strengths

@@ -26,8 +26,9 @@ STAMP_OFFSET = PathColumn.STAMP_S * STAMP_FORMAT.size
 
 
 def new_share(samples: Floats, seen: Measurements, since: Floats) -> Floats:
-    """(k,): the share, 0 to 1, of the uncertainty of (n, 7) samples' position that came since each
-    landmark was placed: `since` (k, 2), by path integration's variances in m^2 and rad^2.
+    """Compute the share, 0 to 1, of the uncertainty of (n, 7) samples' position that came since
+    each landmark was placed, (k,). `since` (k, 2) states how much path integration's variances, in
+    m^2 and rad^2, have grown since then.
     """
     _, deviations = centred(samples[:, :2])
     variances_m2 = np.square(deviations).mean(axis=0)
@@ -40,7 +41,7 @@ def new_share(samples: Floats, seen: Measurements, since: Floats) -> Floats:
 
 
 def variances_when_placed(graph: Graph, seen: Measurements) -> Floats:
-    """(k, 2): path integration's variances at which each landmark in view was placed."""
+    """Return path integration's variances when each landmark in view was placed, (k, 2)."""
     path = graph.path
     variances = []
     for label in seen.labels:
@@ -52,8 +53,8 @@ def variances_when_placed(graph: Graph, seen: Measurements) -> Floats:
 
 
 def variances_at(path: Sequence[PathSegment], stamp_ns: int) -> tuple[float, float]:
-    """Path integration's variances, in m^2 and rad^2, at the place of a `path`, its oldest segment
-    first, at `stamp_ns`, or the next before it; -inf each before the path begins.
+    """Find path integration's variances, in m^2 and rad^2, at the place of a `path` at `stamp_ns`,
+    or the next before it; -inf each before the path begins. The oldest segment comes first.
     """
 
     def begin_s(segment: PathSegment) -> float:

@@ -62,13 +62,13 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """Eq. 4 for each percept of `task` and its landmark: keep the samples that agree with what is
-    seen now.
+    """Apply eq. 4 to each percept of `task` and its landmark: keep the samples that agree with what
+    is seen now.
 
-    A landmark that disagrees in MISSES views in a row, or in more than it ever agreed
-    with, stands elsewhere: it starts anew from what is seen, once it is certain that the agent is
-    not elsewhere. While the agent stands still and sees the same again, landmarks stay where they
-    are; those that were surveyed always do.
+    A landmark that disagrees in MISSES views in a row, or in more than it ever agreed with, stands
+    elsewhere: it starts anew from what is seen, once it is certain that the agent is not elsewhere.
+    While the agent stands still and sees the same again, landmarks stay where they are; those that
+    were surveyed always do.
     """
     agent = graph.agent
     if agent is None:
@@ -99,8 +99,8 @@ CODELET = Codelet(
 
 
 def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config: Config) -> Object:
-    """A landmark with the positions that agree with the view of `task`, and in how many views it
-    agreed, or in how many in a row it did not.
+    """Keep the positions of a landmark that agree with the view of `task`, and count in how many
+    views it agreed, or in how many in a row it did not.
     """
     is_same_view = is_seen_from_here(landmark, agent.stationary_since_ns)
     if landmark.surveyed or agent.misfits.is_lost or is_same_view:
@@ -132,8 +132,8 @@ def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config:
 
 
 def nearby_selves(selves: Floats, config: Config) -> Floats:
-    """(n, 7) samples of the self for placing landmarks relative to it, which is known however lost
-    the agent is.
+    """Return (n, 7) samples of the self for placing landmarks relative to it, which is known
+    however lost the agent is.
 
     The paper's samples start from their mean at each step (§5.4), so that landmarks are as certain
     as the last step was. Here the self's samples keep all that is uncertain since the start; drawn
@@ -154,8 +154,8 @@ def nearby_selves(selves: Floats, config: Config) -> Floats:
 
 
 def first_positions(selves: Floats, percept: Percept, rng: np.random.Generator) -> Floats:
-    """(n, 2) samples of where an object may be that is seen for the first time from (n, 7) samples
-    of the self.
+    """Draw (n, 2) samples of where an object may be that is seen for the first time from (n, 7)
+    samples of the self.
 
     Seen by range alone it is on a ring, by bearing alone on a ray as long as FARTHEST_M.
     """
@@ -179,7 +179,7 @@ def first_positions(selves: Floats, percept: Percept, rng: np.random.Generator) 
 
 
 def with_positions(node: Object, positions_m: Floats) -> Object:
-    """The object with other samples of its position, (n, 2)."""
+    """Replace the samples of the object's position by others, (n, 2)."""
     mean = positions_m.mean(axis=0)
     sd = spread(positions_m, mean)
     return msgspec.structs.replace(
@@ -195,10 +195,10 @@ def with_positions(node: Object, positions_m: Floats) -> Object:
 def refreshed(
     before: Object, after: Object, percept: Percept, task: Task, graph: Graph
 ) -> list[Operation]:
-    """The object, which was as `before`, refreshed by the percept in the view of `task`, and its
-    link to the place there.
+    """Refresh the object, which was as `before`, by the percept in the view of `task`, and link it
+    to the place there.
 
-    Being seen excites its activation. Its base level is learned by consciousness, but that a second
+    Being seen excites its activation. Consciousness teaches its base level, except that a second
     view confirms the first: until then a new object may be a mistake, and is forgotten as soon as
     it is neither in view nor conscious.
     """
@@ -222,7 +222,7 @@ def refreshed(
 
 
 def _mahalanobis2(positions_m: Floats, selves: Floats, percept: Percept) -> Floats:
-    """(n,): squared deviations of the percept from what each pair of landmark and self predicts."""
+    """Compute (n,) squared deviations of the percept from what each landmark and self predict."""
     offset_m = positions_m - selves[:, :2]
     mahalanobis2 = np.zeros(len(offset_m))
 

@@ -207,7 +207,7 @@ def correct(
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:
-    """The self node with the estimate after localization."""
+    """Return the self node with the estimate after localization."""
     mean, offsets = centred(found.samples)
     sd = np.sqrt(np.einsum("nd,nd->d", offsets, offsets) / len(offsets))
     has_gains = bool(sd[POSE_COLUMNS:].any())

@@ -54,8 +54,8 @@ class Measurements(NamedTuple):
 
     @property
     def weights(self) -> Floats:
-        """(k,), 0 to 1: how much each counts for or against a pose that it fits or does not: the
-        logarithm of how likely its name is wrong, over that of a sure one.
+        """Return how much each counts for or against a pose that it fits or does not fit, (k,), 0
+        to 1: the logarithm of how likely its name is wrong, over that of a sure one.
         """
         doubts = 1 - self.evidence.clip(0.0, SURE_EVIDENCE)
         weights: Floats = np.log(doubts) / np.log(1 - SURE_EVIDENCE)
@@ -63,12 +63,12 @@ class Measurements(NamedTuple):
 
     @property
     def has_bearing(self) -> Booleans:
-        """(k,): of which the bearing is known."""
+        """Return whether the bearing of each is known, (k,)."""
         return self.bearing_sd_rad < np.pi
 
     @property
     def has_range(self) -> Booleans:
-        """(k,): of which the range is known."""
+        """Return whether the range of each is known, (k,)."""
         return self.range_sd_m < self.range_m
 
 
@@ -132,8 +132,8 @@ def _single(numbers: Floats) -> Singles:
 
 
 def log_likelihood(density: Singles, weights: Floats | None = None) -> Floats:
-    """(n,): the logarithm of the product over landmarks of p(o_j | l_j, x), from (k, n) densities
-    (eq. 1), each to the power of its weight (k,), or of 1.
+    """Compute the logarithm of the product over landmarks of p(o_j | l_j, x), (n,), from (k, n)
+    densities (eq. 1), each to the power of its weight (k,), or of 1.
 
     OUTLIER_SHARE of the percepts may mean anything, so that a landmark taken for another does not
     outvote the rest.
@@ -145,19 +145,19 @@ def log_likelihood(density: Singles, weights: Floats | None = None) -> Floats:
 
 
 def cost_of_mistake() -> float:
-    """By how much one landmark that is taken for another lowers `log_likelihood` at most."""
+    """Return by how much one landmark that is taken for another lowers `log_likelihood` at most."""
     return -math.log(OUTLIER_SHARE)
 
 
 def measurements(
     percepts: Iterable[Percept], graph: Graph, largest_sd_m: float, stationary_since_ns: int
 ) -> Measurements | None:
-    """The percepts whose object on the map is known well enough to inform; None without any.
+    """Choose the percepts whose object on the map is known well enough to inform; None without any.
 
-    Well enough is to `largest_sd_m`, and to half of its distance: samples on a ring around the
-    agent have their mean where nothing is. It must also have been seen at least MIN_SIGHTINGS
-    times, since a first sighting may have had another's name, and not from where the agent stands
-    since `stationary_since_ns`: the same view again is no new evidence.
+    The object must be known to `largest_sd_m`, and to half of its distance: samples on a ring
+    around the agent have their mean where nothing is. It must also have been seen at least
+    MIN_SIGHTINGS times, since a first sighting may have had another's name, and not from where the
+    agent has stood since `stationary_since_ns`: the same view again is no new evidence.
     """
     chosen: list[Percept] = []
     means_m = []

@@ -65,8 +65,8 @@ class Estimate:
 
 
 def misfit(past: Estimate, seen: Measurements) -> Estimate:
-    """The estimate after a view in which nothing fits. If several landmarks do not, the agent is
-    elsewhere; one that does not for long stands elsewhere, or is another.
+    """Return the estimate after a view in which nothing fits. If several landmarks do not fit, the
+    agent is elsewhere; one that does not fit for long stands elsewhere, or is another.
     """
     count = past.misfit_count + 1
     first = past.first_misfit or seen.labels[0]
@@ -76,8 +76,8 @@ def misfit(past: Estimate, seen: Measurements) -> Estimate:
 
 
 def inflated(found: Estimate, limit_m: float, rng: np.random.Generator) -> Estimate:
-    """In the first views of a lost agent its pose is less certain than it seemed, but no less than
-    to `limit_m`, the standard deviation of path integration alone.
+    """Make the pose of a lost agent less certain in its first views, unless its standard deviation
+    has reached `limit_m`, that of path integration alone.
     """
     is_newly_lost = found.is_lost and found.misfit_count <= MAX_INFLATIONS
     if not is_newly_lost or position_sd_m(found.samples) >= limit_m:
@@ -93,7 +93,7 @@ def recent_percepts(
     something does not fit: everything since a landmark fitted, if the agent is lost, else that of
     the last seconds.
 
-    Path integration alone has the agent at `odometry` (3,).
+    By path integration alone, the agent is at `odometry` (3,).
     """
     since_ns = agent.misfits.last_fit_ns
     if not found.is_lost:
@@ -124,9 +124,9 @@ def relocalized(
 def _where_most_fits(lost: Estimate, seen: Measurements, rng: np.random.Generator) -> Estimate:
     """Relocalize by all that is `seen`, once several landmarks have not fitted for long.
 
-    The agent is where most of them fit one pose, together, all the sooner the more do; else, after
-    a while, it is nowhere else. It relocalizes at once if its position is less certain than one
-    look at a landmark makes it.
+    The agent is where most of them fit one pose together; the more do, the sooner. If there is no
+    such pose for a while, the agent is nowhere else. It relocalizes at once if its position is less
+    certain than one look at a landmark makes it.
     """
     nearest_m = float(seen.range_m.min())
     is_unsure = position_sd_m(lost.samples) > nearest_m
@@ -147,10 +147,10 @@ def _where_most_fits(lost: Estimate, seen: Measurements, rng: np.random.Generato
 
 
 def _reconsidered(doubtful: Estimate, seen: Measurements, rng: np.random.Generator) -> Estimate:
-    """The pose that explains all that is `seen` so much better that more than one landmark would
-    have to be mistaken for the agent to be where it is believed.
+    """Move the estimate to a pose, if there is one, that explains all that is `seen` so much better
+    that the agent can be where it is believed only if more than one landmark is mistaken.
 
-    Others may fit there nevertheless, as landmarks in a row do from several places.
+    Others may fit the believed pose nevertheless, as landmarks in a row do from several places.
     """
     if len(seen.labels) < EARLY_FITTING:
         return doubtful
@@ -169,7 +169,7 @@ def _reconsidered(doubtful: Estimate, seen: Measurements, rng: np.random.Generat
 
 
 def _best_log_likelihood(samples: Floats, seen: Measurements) -> float:
-    """The logarithm of the likelihood of what is seen at the one of (n, 7) samples which explains
-    it best, at most 0.
+    """Compute the logarithm of the likelihood of what is seen at the one of (n, 7) samples which
+    explains it best, at most 0.
     """
     return float(log_likelihood(compare(samples, seen).density, seen.weights).max())

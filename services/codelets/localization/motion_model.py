@@ -28,8 +28,8 @@ RANGE_BIAS_TIME_S = 300.0
 
 
 def gain_sds(config: Config) -> Samples:
-    """(4,): prior standard deviations of the gains of speed and turn rate, of drift in rad/m, and
-    of the gain of range.
+    """Return the (4,) prior standard deviations of the gains of speed and turn rate, of drift in
+    rad/m, and of the gain of range.
     """
     return np.array(
         [config.speed_gain_sd, config.turn_gain_sd, config.drift_rad_per_m, config.range_gain_sd]
@@ -37,7 +37,7 @@ def gain_sds(config: Config) -> Samples:
 
 
 def with_gains(samples: Samples, config: Config, rng: np.random.Generator) -> Samples:
-    """(n, 7) samples of pose and gains; for (n, 3) poses, gains are drawn from their prior."""
+    """Return (n, 7) samples of pose and gains; draw the gains of (n, 3) poses from their prior."""
     if samples.shape[1] == COLUMNS:
         return samples
     gains = rng.normal(0.0, 1.0, (len(samples), GAINS)) * gain_sds(config)
@@ -65,7 +65,7 @@ def propagate_bias(
 
 
 def move(start: Samples, motions: Samples, config: Config, rng: np.random.Generator) -> Samples:
-    """Path integration: (n, 7) samples after (m, 5) rows of speed, turn rate, duration and the
+    """Integrate the path of (n, 7) samples over (m, 5) rows of speed, turn rate, duration and the
     standard deviations of the two rates.
     """
     samples = start.copy()
@@ -80,7 +80,7 @@ def move(start: Samples, motions: Samples, config: Config, rng: np.random.Genera
 
 
 def dead_reckon(pose: Samples, motions: Samples, gains: Samples) -> Samples:
-    """The pose (3,) after (m, 5) rows of motion without noise, the senses' gains being (4,)."""
+    """Compute the pose (3,) after (m, 5) motions without noise, by the senses' `gains`, (4,)."""
     sample = np.concatenate([pose, gains])[None]
     _advance(sample, motions[:, :1], motions[:, 1:2], motions[:, 2])
     after: Samples = sample[0, :POSE_COLUMNS]

@@ -35,8 +35,8 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """A node for the one percept of `task`, with samples of its position; none while the agent is
-    lost.
+    """Make a node for the one percept of `task`, with samples of its position; none while the agent
+    is lost.
     """
     agent = graph.agent
     if agent is None:

@@ -35,10 +35,10 @@ DRIFT_SHARE = 0.05
 
 
 def seen_before(graph: Graph, odometry: Floats, since_ns: float) -> list[Percept]:
-    """Landmarks that were seen after `since_ns`, as they would be in view now, each as it was seen
-    last, from the newest two segments of the path.
+    """Return the landmarks that were seen after `since_ns`, as they would be in view now, each as
+    it was seen last, from the newest two segments of the path.
 
-    Path integration alone has the agent at `odometry` (3,).
+    By path integration alone, the agent is at `odometry` (3,).
     """
     last = graph.last_segment
     if last is None:
@@ -88,8 +88,8 @@ def seen_before(graph: Graph, odometry: Floats, since_ns: float) -> list[Percept
 
 
 def relocalize(gains: Floats, seen: Measurements, rng: np.random.Generator) -> Floats:
-    """(n, 7) samples of the self by what is in view alone; the senses' gains are those of (n, 7)
-    `gains`.
+    """Draw (n, 7) samples of the self by what is in view alone; the senses' gains are those of
+    (n, 7) `gains`.
 
     Each candidate stands on a circle around one of the landmarks, turned to see it as it is seen,
     and is drawn with the likelihood of all others in view. One landmark gives a ring, of which the
@@ -127,13 +127,13 @@ def relocalize(gains: Floats, seen: Measurements, rng: np.random.Generator) -> F
 def best_of(
     samples: Floats, seen: Measurements, is_unsure: bool, min_fitting: int
 ) -> Floats | None:
-    """Those of relocalization's (n, 7) samples at which the agent is taken to be; None if it is at
-    none.
+    """Choose those of relocalization's (n, 7) samples at which the agent is taken to be; None if it
+    is at none.
 
     Most landmarks must fit one of them together, each by how certain its name is. An agent that was
-    sure to be elsewhere is where most of all fit, if that is one place, and `min_fitting` landmarks
-    at least do: one whose own place is not sure counts for half, for two of those fit somewhere
-    nearly always.
+    sure to be elsewhere is where most of all fit, if that is one place, and at least `min_fitting`
+    landmarks fit there. A landmark whose own place is not sure counts for half: two of those nearly
+    always fit somewhere.
     """
     weights = seen.weights
     is_fitting = compare(samples, seen).squared < GATE**2
@@ -155,8 +155,8 @@ def best_of(
 
 
 def relocalize_heading(samples: Floats, seen: Measurements, rng: np.random.Generator) -> Floats:
-    """(n, 7) samples of the self, its position known, its heading unknown: turned by what is in
-    view.
+    """Draw (n, 7) samples of the self, its position known, its heading unknown: turn them by what
+    is in view.
 
     Each candidate stands as one of `samples`, turned to see one of the landmarks as it is seen, and
     is drawn with the likelihood of all that is in view but that one's bearing.
@@ -178,7 +178,7 @@ def relocalize_heading(samples: Floats, seen: Measurements, rng: np.random.Gener
 
 
 def _drawn(candidates: Floats, density: Singles, count: int, rng: np.random.Generator) -> Floats:
-    """`count` of (n, 7) candidates, drawn by the (k, n) densities of the landmarks in view."""
+    """Draw `count` of (n, 7) candidates by the (k, n) densities of the landmarks in view."""
     scores = log_likelihood(density)
     weights = np.exp(scores - scores.max())
     probabilities = weights / weights.sum()

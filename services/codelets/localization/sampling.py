@@ -18,19 +18,19 @@ MAX_KERNEL_VARIANCE = 0.9
 
 
 def generator(identifier: str) -> np.random.Generator:
-    """A generator seeded by `identifier` alone, so that every worker draws the same numbers."""
+    """Make a generator seeded by `identifier` alone, so that all workers draw the same numbers."""
     digest = hashlib.blake2b(identifier.encode(), digest_size=8).digest()
     return np.random.default_rng(int.from_bytes(digest))
 
 
 def standard_normal(rng: np.random.Generator, *shape: int) -> Samples:
-    """Standard normal numbers of single precision: they cost half, and noise needs no more."""
+    """Draw standard normal numbers of single precision: they cost half, and noise needs no more."""
     return rng.standard_normal(shape, np.float32).astype(np.float64)
 
 
 def centred(samples: Samples) -> tuple[Samples, Samples]:
-    """The mean (d,) of (n, d) samples and their deviations (n, d) from it. Of three columns or more
-    the third is a heading.
+    """Compute the mean (d,) of (n, d) samples and their deviations (n, d) from it. Of three columns
+    or more the third is a heading.
     """
     count, columns = samples.shape
     weights = np.full(count, 1 / count)
@@ -46,8 +46,8 @@ def centred(samples: Samples) -> tuple[Samples, Samples]:
 
 
 def spread(samples: Samples, mean: Samples) -> Samples:
-    """(d,): the standard deviation of each column about `mean`; of three columns the third is a
-    heading.
+    """Compute the standard deviation of each column about `mean`, (d,); of three columns the third
+    is a heading.
     """
     deviations = samples - mean
     if samples.shape[1] == 3:
@@ -56,8 +56,8 @@ def spread(samples: Samples, mean: Samples) -> Samples:
 
 
 def position_sd_m(samples: Samples) -> float:
-    """The standard deviation of the distance of (n, d) samples from their mean position, which is
-    in the first two columns.
+    """Compute the standard deviation of the distance of (n, d) samples from their mean position,
+    which is in the first two columns.
     """
     _, offsets_m = centred(samples[:, :2])
     variance_m2 = np.square(offsets_m).sum(axis=1).mean()
@@ -65,9 +65,9 @@ def position_sd_m(samples: Samples) -> float:
 
 
 def rejection_mask(log_likelihood: Samples, rng: np.random.Generator) -> Booleans:
-    """(n,): which samples rejection keeps, each with a probability proportional to its likelihood.
+    """Draw which of (n,) samples rejection keeps, with probabilities proportional to likelihood.
 
-    The likeliest is always kept, so that one is, even if all are unlikely.
+    The likeliest is always kept, so that at least one is, even if all are unlikely.
     """
     probability = np.exp(log_likelihood - log_likelihood.max())
     kept: Booleans = rng.random(len(probability)) < probability
@@ -76,8 +76,8 @@ def rejection_mask(log_likelihood: Samples, rng: np.random.Generator) -> Boolean
 
 
 def inflate(poses: Samples, factor: float, rng: np.random.Generator) -> Samples:
-    """Samples whose first three columns deviate `factor` times as far from their mean, and a little
-    at random.
+    """Return samples whose first three columns deviate `factor` times as far from their mean, and a
+    little at random.
     """
     mean = mean_pose(poses)
     deviations = poses[:, :3] - mean
@@ -90,10 +90,11 @@ def inflate(poses: Samples, factor: float, rng: np.random.Generator) -> Samples:
 
 
 def kernel_smooth(drawn: Samples, effective: float, rng: np.random.Generator) -> Samples:
-    """(n, d) samples in place of `drawn`, which repeats few, with the same mean and covariance.
+    """Draw (n, d) samples in place of `drawn`, which repeats few, with its mean and covariance.
 
-    A Gaussian kernel of Silverman's width for `effective` samples, shrunk towards the mean by as
-    much (Liu and West 2001). Of three columns or more the third is a heading.
+    They come from a Gaussian kernel of Silverman's width for `effective` samples, and are shrunk
+    towards the mean by as much (Liu and West 2001). Of three columns or more the third is a
+    heading.
     """
     count, columns = drawn.shape
     mean, deviations = centred(drawn)
@@ -111,11 +112,11 @@ def kernel_smooth(drawn: Samples, effective: float, rng: np.random.Generator) ->
 
 
 def tempering_exponent(log_likelihood: Samples, share: float) -> float:
-    """About the largest power of the likelihood, at most 1, with which rejection keeps a `share` of
-    the samples.
+    """Approximate the largest power of the likelihood, at most 1, with which rejection keeps a
+    `share` of the samples.
 
     The logarithm of what is kept falls with the power, ever more slowly: a straight line from the
-    start leads to a power that is a little too large, and from there on ever nearer.
+    start leads to a power that is a little too large, and each line after it to one that is nearer.
     """
     relative = (log_likelihood - log_likelihood.max()).astype(np.float32)
     target = float(np.log(share))
@@ -157,8 +158,8 @@ def rejection_resample(
 def resample(
     kept: Samples, count: int, jitter: float | Samples, rng: np.random.Generator
 ) -> Samples:
-    """`count` samples of those kept, each as often as the next, with normal noise of standard
-    deviation `jitter`, one for all columns or (d,).
+    """Repeat the samples that were kept, each equally often, to get `count` of them, and add normal
+    noise of standard deviation `jitter`, one for all columns or (d,).
     """
     whole, rest = divmod(count, len(kept))
     evenly = np.arange(rest) * len(kept) // max(1, rest)

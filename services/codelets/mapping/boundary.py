@@ -48,8 +48,8 @@ def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
-    """New evidence and weights of the links around the agent, and the obstacles there; none while
-    the agent is lost.
+    """Compute new evidence and weights of the links around the agent, and the obstacles there; none
+    while the agent is lost.
     """
     agent = graph.agent
     if agent is None or task.road_m is None or task.road_boundary_m is None:
@@ -93,7 +93,7 @@ CODELET = Codelet(
 
 
 def _central(positions: Floats, within: float) -> Floats:
-    """(k, 2): those of (n, 2) positions that are near the middle of their cell, along both axes."""
+    """Choose the (k, 2) of (n, 2) positions near the middle of their cell, along both axes."""
     from_middle = np.abs(positions - np.rint(positions))
     is_central = (from_middle <= within).all(axis=1)
     central: Floats = positions[is_central]
@@ -101,10 +101,10 @@ def _central(positions: Floats, within: float) -> Floats:
 
 
 def _free(is_road: Booleans, is_clear: Booleans, road: Singles) -> Floats:
-    """(4, w, h): which links are seen to be free, by how sure that is, 0 to 1.
+    """Compute which links are seen to be free, (4, w, h), by how sure that is, 0 to 1.
 
-    Those between place nodes that are both seen as road are. A ray passes over a kerb: that it
-    passes through both place nodes counts if the ground at both is of one kind, and less.
+    A link between two place nodes that are both seen as road is free. A ray passes over a kerb: so
+    a ray through both place nodes counts less, and only if the ground at both is of one kind.
     """
     here = np.stack([is_road, is_clear, road])
     _, width, height = here.shape

@@ -39,8 +39,8 @@ def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
-    """An object where the agent stands that eases each need that is eased. What was felt is known
-    for good: its base level is the highest.
+    """Add an object where the agent stands for each need that is eased there; the object eases it.
+    What was felt is known for good: the object's base level is the highest.
     """
     agent = graph.agent
     if agent is None or agent.misfits.is_lost:
@@ -86,7 +86,7 @@ CODELET = Codelet(
 
 
 def _unexplained(agent: Self, graph: Graph) -> list[str]:
-    """The functions that ease a need now, if no object nearby has them."""
+    """Return the functions that ease a need now, if no object nearby has them."""
     here_m = (agent.x_m, agent.y_m)
     near = set()
     for node in graph.of_kind(Object):

@@ -22,7 +22,7 @@ class Edges(NamedTuple):
     ends: Floats
 
     def middles(self) -> Floats:
-        """(k, 2): the middle of each."""
+        """Compute the middle of each, (k, 2)."""
         return (self.starts + self.ends) / 2
 
 
@@ -47,7 +47,7 @@ def edges_of(boundary_m: Floats, rays: Rays, grid: LocalGrid) -> Edges:
 
 
 def cut_links(edges: Edges, grid: LocalGrid) -> Floats:
-    """(4, w, h): the links that edges cross, by how sure their place is, 0 to 1."""
+    """Find the links that edges cross, (4, w, h), by how sure their place is, 0 to 1."""
     away = edges.middles() - grid.eye
     range_m = np.hypot(away[:, 0], away[:, 1]) * grid.cell_m
     certainty = grid.certainty(range_m)

@@ -20,10 +20,10 @@ MIN_CHANGE = 0.02
 
 
 def accumulated(evidence: Singles, cut: Floats, free: Floats) -> Singles:
-    """The evidence of links after a view in which they appeared `cut`, or otherwise `free`, each 0
-    to 1, by how sure that was; above 0 it is for free, below 0 for cut.
+    """Update the evidence of links after a view in which they appeared `cut`, or otherwise `free`,
+    each 0 to 1, by how sure that was; evidence above 0 is for free, below 0 for cut.
 
-    It saturates, so that what changes counts after a few views, however long it was otherwise.
+    It saturates, so that a change counts after a few views, however long the link was otherwise.
     """
     change = np.where(cut > 0, -CUT_GAIN * cut, FREE_GAIN * free)
     after = (evidence + change).clip(-MAX_CUT, MAX_FREE)
@@ -31,7 +31,8 @@ def accumulated(evidence: Singles, cut: Floats, free: Floats) -> Singles:
 
 
 def weights_of(evidence: Singles) -> Singles:
-    """The weights of links by their evidence: 1 if it is not below 0, and 0 if they are cut.
+    """Compute the weights of links from their evidence: 1 if it is not below 0, and 0 if they are
+    cut.
 
     It takes more than one sighting to cut a link.
     """
@@ -40,7 +41,7 @@ def weights_of(evidence: Singles) -> Singles:
 
 
 def blended(shares: Singles, seen: Floats, certainty: Floats) -> Singles:
-    """The shares of cells, 0 to 1, after a view in which they appeared as `seen`, weighed by
+    """Update the shares of cells, 0 to 1, after a view in which they appeared as `seen`, weighed by
     `certainty`, 0 if they were not in view: a running mean over the last few views.
     """
     after = shares + CELL_GAIN * certainty * (seen - shares)
@@ -49,6 +50,6 @@ def blended(shares: Singles, seen: Floats, certainty: Floats) -> Singles:
 
 
 def _if_changed(before: Singles, after: Floats) -> Singles:
-    """`after` if it differs enough from `before`, which stays elsewhere."""
+    """Take `after` for what differs enough from `before`, and `before` for the rest."""
     is_changed = np.abs(after - before) > MIN_CHANGE
     return np.where(is_changed, after, before).astype(np.float32)

@@ -38,7 +38,7 @@ class LocalGrid:
 
     @classmethod
     def around(cls, agent: Self, cell_m: float, reach_m: float) -> LocalGrid:
-        """The cells within `reach_m` of the agent, and some more."""
+        """Make a grid of the cells within `reach_m` of the agent, and some more."""
         pose = np.array([agent.x_m, agent.y_m, agent.heading_rad])
         here_i, here_j = np.rint(pose[:2] / cell_m).astype(int).tolist()
         side = math.ceil(reach_m / cell_m) + MARGIN_CELLS
@@ -53,16 +53,16 @@ class LocalGrid:
 
     @property
     def eye(self) -> Floats:
-        """(2,): where the agent is."""
+        """Return the position of the agent, (2,)."""
         position: Floats = self.pose[:2] / self.cell_m
         return position
 
     def positions(self, points_m: Floats) -> Floats:
-        """(n, 2) points in the robot's frame, as positions."""
+        """Convert (n, 2) points in the robot's frame to positions."""
         return transform_from(self.pose, points_m) / self.cell_m
 
     def range_m(self) -> Floats:
-        """(w, h): the distance of each cell from the agent."""
+        """Compute the distance of each cell from the agent, (w, h)."""
         at_i, at_j = self.eye.tolist()
         first_i, first_j = self.extent.lower
         last_i, last_j = self.extent.upper
@@ -73,7 +73,7 @@ class LocalGrid:
         return range_m
 
     def certainty(self, range_m: Floats) -> Floats:
-        """Return how much something seen at these ranges is worth, 0 to 1: half where the standard
+        """Return how much something seen at these ranges is worth, 0 to 1: half if the standard
         deviation of its position is half a cell.
 
         The agent's own uncertainty counts for half a cell at most: while it explores, the map is as
@@ -88,11 +88,11 @@ class LocalGrid:
         return certain
 
     def has(self, positions: Floats) -> Booleans:
-        """(w, h): whether any of (n, 2) positions lies in each cell."""
+        """Decide whether any of (n, 2) positions lies in each cell, (w, h)."""
         return self.counts(positions) > 0
 
     def counts(self, positions: Floats) -> Indices:
-        """(w, h): how many of (n, 2) positions lie in each cell."""
+        """Count how many of (n, 2) positions lie in each cell, (w, h)."""
         width, height = self.extent.shape
         cells = np.rint(positions).astype(np.int64) - self.extent.lower
         is_inside = (cells >= 0) & (cells < (width, height))
@@ -105,8 +105,8 @@ class LocalGrid:
     def changed(
         self, columns: Sequence[PlaceColumn], before: Singles, after: Singles
     ) -> list[Operation]:
-        """The operations that write the cells whose value in one of k columns changes, from
-        (k, w, h) `before` to `after`; none of a column that does not.
+        """Return the operations that write the cells whose value in one of k columns changes, from
+        (k, w, h) `before` to `after`; none for a column that does not change.
         """
         known = Window(self.extent.lower, tuple(columns), before)
         return changed_cells(self.map_id, known, after)

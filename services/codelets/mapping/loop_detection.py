@@ -40,8 +40,8 @@ PLACE_CUE = ""
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """Return one task if a landmark comes again that was away for long, or the path grows along it
-    since, or along a known path.
+    """Return one task if a landmark comes again after long, or the path has grown along it since,
+    or along a known path.
     """
     percepts = context.percepts
     long_ago_ns = context.stamp_ns - config.revisit_s * 1e9
@@ -61,11 +61,11 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """A closure for each percept and match of `task`.
+    """Make a closure for each percept and match of `task`.
 
     Each view of a landmark is joined to an observation of its own, so that one mistake, now or
-    then, makes one closure. Where the map has the landmark is not used: this pass may have moved
-    it.
+    then, makes one closure. The landmark's position on the map is not used: this pass may have
+    moved it.
     """
     if not task.percepts and not task.matches:
         raise MessageError(f"task {task.task_id} has nothing that was seen again")
@@ -110,7 +110,7 @@ CODELET = Codelet(
 
 
 def newest_closures(graph: Graph) -> dict[str, LoopClosure]:
-    """The newest closure by each landmark, and by places, under PLACE_CUE."""
+    """Find the newest closure by each landmark, and by places, under PLACE_CUE."""
     closures = sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns)
     return {PLACE_CUE if each.sd_rad else each.cue: each for each in closures}
 
@@ -118,8 +118,8 @@ def newest_closures(graph: Graph) -> dict[str, LoopClosure]:
 def _seen_again(
     percepts: Iterable[Percept], graph: Graph, now_ns: int, config: Config
 ) -> list[Percept]:
-    """The percepts of landmarks that come again: last seen, or closing a loop, long ago; or closing
-    one on this pass, if the path has grown since.
+    """Choose the percepts of landmarks that come again: last seen, or closing a loop, long ago; or
+    closing one on this pass, if the path has grown since.
     """
     known = [each for each in percepts if each.whole and object_id(each.label) in graph.nodes]
     if not known:
@@ -147,7 +147,7 @@ def _seen_again(
 def _closure_by_landmark(
     percept: Percept, task: Task, graph: Graph, newest: LoopClosure | None, config: Config
 ) -> LoopClosure | None:
-    """A closure to one of the landmark's observations before; None if these are too few."""
+    """Make a closure to one of the landmark's observations before; None if these are too few."""
     landmark = graph.get(Object, object_id(percept.label))
     if landmark is None or not (percept.has_bearing and percept.has_range):
         return None

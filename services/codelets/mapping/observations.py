@@ -47,7 +47,7 @@ class Viewpoint(NamedTuple):
 
 
 def extended(before: Observations | None, viewpoint: Viewpoint, percept: Percept) -> Observations:
-    """The observations of a landmark along a path segment, with one more."""
+    """Add one more to the observations of a landmark along a path segment."""
     forwards_m, left_m, turned_rad = viewpoint.step.tolist()
     direction_rad = turned_rad + percept.bearing_rad
     range_m = percept.range_m / (1 + viewpoint.range_gain)
@@ -93,7 +93,7 @@ class Sightings(NamedTuple):
 
     @classmethod
     def of(cls, observations: Iterable[Observations], stamps_s: Floats) -> Sightings:
-        """The observations that were made from the places of the path at `stamps_s`, (n,)."""
+        """Gather the observations made from the places of the path at `stamps_s`, (n,)."""
         records = list(observations)
         labels = tuple(sorted({record.landmark for record in records}))
         number_of = {label: number for number, label in enumerate(labels)}
@@ -121,8 +121,8 @@ class Sightings(NamedTuple):
         )
 
     def weights(self, poses: Floats, landmarks_m: Floats) -> Floats:
-        """(m,) how much each counts, the path being at (n, 3) `poses` and landmarks at (k, 2):
-        Cauchy's weights.
+        """Compute how much each counts, (m,), by Cauchy's weights, if the path is at (n, 3) `poses`
+        and landmarks at (k, 2).
         """
         offset_m = landmarks_m[self.landmark] - poses[self.place, :2]
         turn = rotation_matrices(poses[self.place, 2])
@@ -133,8 +133,8 @@ class Sightings(NamedTuple):
         return weights
 
     def landmarks_m(self, poses: Floats) -> Floats:
-        """(k, 2): where the landmarks are most likely, the path being at (n, 3) `poses`: the means
-        of where they were seen, weighed anew in each round, from the medians on.
+        """Estimate where the landmarks are most likely, (k, 2), if the path is at (n, 3) `poses`:
+        the means of where they were seen, weighed anew in each round, from the medians on.
         """
         turn = rotation_matrices(poses[self.place, 2])
         seen_m = poses[self.place, :2] + matvec(turn, self.where_m)
@@ -152,15 +152,15 @@ class Sightings(NamedTuple):
         return landmarks_m
 
     def _sums(self, values: Floats) -> Floats:
-        """(k, ...): the sum of the (m, ...) values of each landmark's sightings."""
+        """Compute the (k, ...) sums of the (m, ...) values of each landmark's sightings."""
         _, *shape = values.shape
         sums = np.zeros((len(self.labels), *shape))
         np.add.at(sums, self.landmark, values)
         return sums
 
     def constraints(self, first_landmark: int, weights: Floats) -> Constraints:
-        """Between places of the path and landmarks, the latter as poses from number
-        `first_landmark` on.
+        """Return constraints between places of the path and landmarks, the latter as poses from
+        number `first_landmark` on.
         """
         count = len(self.place)
         information = np.zeros((count, 3, 3))

@@ -141,12 +141,12 @@ def path_grows(graph: Graph, config: Config) -> bool:
 
 
 def with_rows(segment: PathSegment, rows: Floats) -> PathSegment:
-    """A path segment with other (n, COLUMNS) rows."""
+    """Replace the rows of a path segment by other (n, COLUMNS) rows."""
     return msgspec.structs.replace(segment, rows=Matrix.of(rows))
 
 
 def segments(rows: Floats, first: int = 0) -> list[PathSegment]:
-    """The path segments of (n, COLUMNS) `rows`, numbered from `first`."""
+    """Divide (n, COLUMNS) `rows` into path segments, numbered from `first`."""
     parts = []
     for start in range(0, len(rows), ROWS):
         number = first + start // ROWS
@@ -162,8 +162,8 @@ def segments(rows: Floats, first: int = 0) -> list[PathSegment]:
 
 
 def steps_of(rows: Floats, config: Config) -> Constraints:
-    """The steps of path integration from each row to the next, as certain as self-motion states, or
-    less, by the distance.
+    """Return the steps of path integration from each row to the next, as certain as self-motion
+    states, but no more certain than their length and turn allow.
     """
     places = np.arange(max(0, len(rows) - 1))
     odometry = rows[:, ODOMETRY]
@@ -191,7 +191,7 @@ def steps_of(rows: Floats, config: Config) -> Constraints:
 
 
 def joins_of(path: Iterable[PathSegment], stamps_s: Floats) -> Constraints:
-    """The joins of path segments, between the places of the whole path, at `stamps_s` (n,)."""
+    """Return path segments' joins, between the places of the whole path, at `stamps_s` (n,)."""
     rows = [np.zeros((0, len(JoinColumn)))]
     for segment in path:
         if segment.joins is not None:
@@ -236,7 +236,7 @@ def _observations(graph: Graph, number: int, label: str) -> Observations | None:
 
 
 def links_of(observations: Observations) -> list[Link]:
-    """The links from new observations to the landmark and to the path segment."""
+    """Return the links from new observations to the landmark and to the path segment."""
     landmark = object_id(observations.landmark)
     segment = segment_id(observations.number)
 
@@ -247,7 +247,7 @@ def links_of(observations: Observations) -> list[Link]:
 
 
 def objects_along(graph: Graph, segment: PathSegment) -> list[tuple[Observations, Object]]:
-    """The observations along a path segment, by landmark, of objects that the map has."""
+    """Return a path segment's observations of objects on the map, with these, by landmark."""
     names = sorted(graph.links.sources(segment.id, LinkKind.ALONG))
 
     found = []

@@ -38,7 +38,7 @@ class Rays:
     angle_rad: float
 
     def hits(self) -> Floats:
-        """(k, 2): where something stands."""
+        """Return where something stands, (k, 2)."""
         lengths = self.length[self.is_hit]
         along = lengths[:, None] * self.directions[self.is_hit]
         ends: Floats = self.eye + along
@@ -46,8 +46,8 @@ class Rays:
 
 
 def rays_of(scan: Array | None, road_m: Floats, grid: LocalGrid) -> Rays:
-    """The rays of a task's scan on `grid`; none without a scan. Those that hit something
-    before road that is seen, `road_m` (n, 2), are left out: nothing stands there.
+    """Return the rays of a task's scan on `grid`; none without a scan. Leave out those that hit
+    something in front of road that is seen, `road_m` (n, 2): nothing stands there.
 
     A ray is clear up to half a cell, and twice the standard deviation, before what it hits. One
     that saw nothing at all, which may be the fault of the sensor, is clear for half the reach.
@@ -72,10 +72,10 @@ def rays_of(scan: Array | None, road_m: Floats, grid: LocalGrid) -> Rays:
 
 
 def _before_road(rays: Floats, road_m: Floats) -> Floats:
-    """(k, 2): the rays, bearing and range each, beyond whose hit no road is seen in their sector.
+    """Choose the (k, 2) rays, bearing and range, beyond whose hit their sector shows no road.
 
-    Of two senses that contradict each other, that for the road is the better one: behind an
-    obstacle that stereo finds by a wrong match, the road continues.
+    If the two senses contradict each other, that for the road is the better one: behind an obstacle
+    that stereo finds by a wrong match, the road continues.
     """
     if not len(rays):
         return rays
@@ -94,7 +94,7 @@ def _before_road(rays: Floats, road_m: Floats) -> Floats:
 
 
 def clear_cells(rays: Rays, grid: LocalGrid) -> Booleans:
-    """(w, h): the cells that rays pass through and in which they hit nothing."""
+    """Find the cells that rays pass through and in which they hit nothing, (w, h)."""
     farthest = np.max(rays.clear, initial=0.0)
     along = np.arange(0.0, farthest, STEP)
     is_clear = along < rays.clear[:, None]

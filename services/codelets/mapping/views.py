@@ -15,7 +15,7 @@ MIN_SD_M = 1e-3
 
 
 def views_of(closures: list[LoopClosure], rows: Floats) -> Views:
-    """The closures as views from rows of the path, those nearest in time."""
+    """Convert the closures to views from rows of the path, those nearest in time."""
     stamps_s = np.array([[each.from_ns, each.to_ns] for each in closures]).reshape(-1, 2) * 1e-9
     path_s = rows[:, STAMP]
     after = path_s.searchsorted(stamps_s).clip(max=len(rows) - 1)
@@ -38,7 +38,7 @@ def views_of(closures: list[LoopClosure], rows: Floats) -> Views:
 
 
 def constraints_of(views: Views, poses: Floats) -> Constraints:
-    """The views as constraints between (n, 3) poses, near those.
+    """Convert the views to constraints between (n, 3) poses, near those.
 
     A landmark determines the agent's position given its heading alone: with another heading the
     agent stands elsewhere around it.

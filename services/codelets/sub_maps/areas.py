@@ -31,7 +31,7 @@ class Area(NamedTuple):
     height_m: float
 
     def differs_from(self, node: Map, tolerance_m: float) -> bool:
-        """Return whether any border of it lies elsewhere than a sub-map's, by more than this."""
+        """Return whether any border is farther than `tolerance_m` from that of a sub-map."""
         sides_m = (self.width_m - node.width_m) / 2, (self.height_m - node.height_m) / 2
         middle_m = self.x_m - node.x_m, self.y_m - node.y_m
         for moved_m, grown_m in zip(middle_m, sides_m, strict=True):
@@ -60,7 +60,7 @@ def is_outdated(node: Map, members: Mapping[int, Sequence[Object]]) -> bool:
 
 
 def sub_map_node(number: int, area: Area, graph: Graph) -> Map:
-    """The node of a sub-map. The larger its area, the coarser its grid (paper §5.3)."""
+    """Make the node of a sub-map. The larger its area, the coarser its grid (paper §5.3)."""
     root_cell_m = graph.cell_m(ROOT_MAP)
     area_m2 = area.width_m * area.height_m
     wanted_m = math.sqrt(area_m2 / PLACES)

@@ -49,7 +49,7 @@ def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
-    """The coarse places that have changed; first of all, the maps that they are in."""
+    """Update the coarse places that have changed; first of all, make the maps that they are in."""
     agent = graph.agent
     if agent is None:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
@@ -92,7 +92,7 @@ CODELET = Codelet(
 
 
 def _missing(graph: Graph) -> list[Operation]:
-    """The nodes of the coarse maps that do not exist yet."""
+    """Make the nodes of the coarse maps that do not exist yet."""
     missing: list[Operation] = []
     for level in range(1, LEVELS + 1):
         identifier = coarse_map_id(level)
@@ -104,7 +104,7 @@ def _missing(graph: Graph) -> list[Operation]:
 
 
 def _blocks(extent: Extent) -> list[Extent]:
-    """The blocks of the coarsest map, in its cells, that cover a rectangle of the root map's."""
+    """Return the blocks of the coarsest map, in its cells, that cover an extent of the root map."""
     side = CELLS * BLOCK
     blocks = []
     for i in range(extent.lower[0] // side, math.ceil(extent.upper[0] / side)):
@@ -115,7 +115,7 @@ def _blocks(extent: Extent) -> list[Extent]:
 
 
 def _update(graph: Graph, coarsest: Extent) -> list[Operation]:
-    """The cells that change on the levels whose coarsest one has these."""
+    """Write the cells that change on all levels, in a rectangle of cells of the coarsest one."""
     # Each level needs the finer cells below its own, with a margin.
     extents = [coarsest]
     margin = FACTOR // 2 + MARGIN

@@ -29,9 +29,9 @@ class Places(NamedTuple):
 
 
 def places_of(road: Singles, obstacle: Singles, weights: Singles) -> Places:
-    """The place nodes of a map, by columns (w, h) and the (4, w, h) weights of links.
+    """Find the place nodes of a map, by columns (w, h) and the (4, w, h) weights of links.
 
-    No link leads to where something stands. Those to beyond the rectangle are judged by their own
+    No link leads to where something stands. Links that leave the rectangle are judged by their own
     weight.
     """
     _, width, height = weights.shape
@@ -47,12 +47,12 @@ def places_of(road: Singles, obstacle: Singles, weights: Singles) -> Places:
 
 
 def coarser(fine: Places) -> Places:
-    """The coarse place nodes of a rectangle that `fine` covers with a margin of MARGIN on each
-    side.
+    """Compute the coarse place nodes of a rectangle that `fine` covers with a margin of MARGIN on
+    each side.
 
-    One is as much road as any place in it. A link can be traversed if some row of the finer
-    links leads from beside the one node to beside the other; diagonally, if the row between them
-    does.
+    A coarse node is as much road as the most road-like place in it. A link can be traversed if some
+    row of the finer links leads from beside the one node to beside the other; diagonally, if the
+    row between them does.
     """
     road = np.max([_block(fine.road, i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)], axis=0)
 
@@ -68,7 +68,7 @@ def coarser(fine: Places) -> Places:
 
 
 def _block(values: Values, i: int, j: int) -> Values:
-    """(w, h): of each coarse cell, the value of the finer cell at (i, j) from its middle."""
+    """Return for each coarse cell the value of the finer cell at (i, j) from its middle, (w, h)."""
     first = MARGIN + FACTOR // 2
     width, height = ((size - 2 * MARGIN) // FACTOR for size in values.shape)
     rows = slice(first + i, first + i + FACTOR * width, FACTOR)

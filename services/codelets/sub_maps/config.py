@@ -22,32 +22,32 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     concentration: Annotated[
         float,
         Meta(
-            description="concentration of the Dirichlet process: how readily there is one more "
-            "sub-map, above 0, at most 1e6",
+            description="Concentration of the Dirichlet process: how readily there is one more "
+            "sub-map.",
             gt=0,
             le=1e6,
         ),
     ] = 0.01
     position_weight: Annotated[
         Weight,
-        Meta(description="weight of the positions of objects, 0 to 1000"),
+        Meta(description="Weight of the positions of objects."),
     ] = 0.05
     spacing_weight: Annotated[
         Weight,
-        Meta(description="weight of how densely objects stand, 0 to 1000"),
+        Meta(description="Weight of how densely objects stand."),
     ] = 0.5
     function_weight: Annotated[
         Weight,
-        Meta(description="weight of the functions of objects, 0 to 1000"),
+        Meta(description="Weight of the functions of objects."),
     ] = 1.0
     boundary_weight: Annotated[
         Weight,
-        Meta(description="weight of the boundaries between neighbouring objects, 0 to 1000"),
+        Meta(description="Weight of the boundaries between neighbouring objects."),
     ] = 0.7
     gap_weight: Annotated[
         Weight,
         Meta(
-            description="weight of open ground between neighbouring objects, wider than between "
-            "others there, 0 to 1000"
+            description="Weight of open ground between neighbouring objects, wider than between "
+            "others there."
         ),
     ] = 1.0

@@ -26,7 +26,7 @@ class CutLinks(NamedTuple):
 
     @classmethod
     def around(cls, graph: Graph, positions_m: Floats) -> CutLinks:
-        """The boundaries of the root map in the rectangle that holds (n, 2) positions."""
+        """Read the boundaries of the root map in the rectangle that holds (n, 2) positions."""
         cell_m = graph.cell_m(ROOT_MAP)
         low_i, low_j = np.floor(positions_m.min(axis=0) / cell_m).astype(int).tolist()
         high_i, high_j = np.ceil(positions_m.max(axis=0) / cell_m).astype(int).tolist()
@@ -36,7 +36,7 @@ class CutLinks(NamedTuple):
         return cls(window.origin, cell_m, window.weights())
 
     def are_crossed(self, lines_m: Floats, clear_m: Floats | None = None) -> Booleans:
-        """(k,): if some link along each of (k, 2, 2) lines is cut.
+        """Decide for each of (k, 2, 2) lines whether some link along it is cut, (k,).
 
         Links within `clear_m` of its ends, (k, 2), do not count: they are of what stands there.
         Outside the rectangle nothing is known to be cut.

@@ -70,7 +70,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
-    """The sub-maps around what the task is about, and the links of their objects to them."""
+    """Update the sub-maps around what the task is about, and the links of their objects to them."""
     if task.about:
         new = [node for node in nodes_of(graph, Object, task.about) if _is_new(node, graph)]
         moved = nodes_of(graph, Map, task.about)
@@ -131,8 +131,8 @@ def _is_new(node: Object, graph: Graph) -> bool:
 def _sorted(
     objects: list[Object], before: Indices, graph: Graph, config: Config, *, all_anew: bool
 ) -> Indices:
-    """(n,): the number of the sub-map that each object is in now; `before` (n,) it was in, those
-    that are NEW last.
+    """Find the number of the sub-map that each object is in now, (n,). It was in `before`, (n,);
+    objects that are NEW come last.
     """
     if not objects:
         return np.zeros(0, np.int64)

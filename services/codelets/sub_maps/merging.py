@@ -28,12 +28,12 @@ class Merging:
 
     @property
     def count(self) -> int:
-        """How many clusters there are."""
+        """Return how many clusters there are."""
         return len(self._statistics)
 
     def scores(self, floor: float) -> Floats:
-        """(p,): by how much merging a pair raises the logarithm of the probability, for each object
-        of the smaller cluster; -inf if it gains no more than `floor`.
+        """Compute by how much merging each pair raises the logarithm of the probability, for each
+        object of the smaller cluster, (p,); -inf if it gains no more than `floor`.
         """
         sizes = self._statistics[:, COUNT]
         smaller = sizes[self.pairs].min(axis=1)
@@ -59,13 +59,13 @@ class Merging:
         self._set_pairs(number[self.pairs], self._bonds, self._gains, is_changed)
 
     def labels(self, labels: Indices) -> Indices:
-        """(n,): the labels of objects now, by those that they had at first."""
+        """Return the labels of objects now, (n,), by those that they had at first."""
         now: Indices = self._number[labels]
         return now
 
     def _set_pairs(self, ends: Indices, bonds: Floats, gains: Floats, is_changed: Booleans) -> None:
-        """Take pairs of clusters, (q, 2), of which some are one pair, or one cluster. The gains of
-        pairs with a cluster that is changed, (count,), are computed anew.
+        """Take pairs of clusters, (q, 2), some of which may be the same pair, or a cluster with
+        itself. The gains of pairs with a cluster that is changed, (count,), are computed anew.
         """
         is_between = ends[:, 0] != ends[:, 1]
         low = ends[is_between].min(axis=1)

@@ -66,7 +66,7 @@ class Scene(NamedTuple):
     bonds: Floats
 
     def part(self, members: Indices) -> Scene:
-        """The same of some of the objects, (m,), alone."""
+        """Return the scene of some of the objects, (m,), alone."""
         number = np.full(len(self.rows), -1)
         number[members] = np.arange(len(members))
 
@@ -75,19 +75,19 @@ class Scene(NamedTuple):
         return Scene(self.rows[members], renumbered[is_inside], self.bonds[is_inside])
 
     def within(self, labels: Indices) -> Scene:
-        """The same if only objects of one cluster are neighbours."""
+        """Return the scene if only objects of one cluster are neighbours."""
         is_within = labels[self.edges[:, 0]] == labels[self.edges[:, 1]]
         return Scene(self.rows, self.edges[is_within], self.bonds[is_within])
 
     def merged(self, pieces: Indices) -> Scene:
-        """The same if the objects of each piece, (n,) from 0, are one."""
+        """Return the scene if the objects of each piece, (n,) from 0, are one."""
         ends = pieces[self.edges]
         is_between = ends[:, 0] != ends[:, 1]
         return Scene(summed(self.rows, pieces), ends[is_between], self.bonds[is_between])
 
 
 def rows_of(positions_m: Floats, functions: Indices, kinds: int) -> Floats:
-    """(n, 8 + kinds): the sufficient statistics of each object; those of a cluster are their sum.
+    """Return (n, 8 + kinds) sufficient statistics of objects; those of a cluster are their sum.
 
     They are 1, x, y, xx, xy, yy, the spacing s, ss, both 0 as yet, and 1 in the column of the
     function, which is from 0 to `kinds` - 1, or -1 if it is unknown.
@@ -104,7 +104,7 @@ def rows_of(positions_m: Floats, functions: Indices, kinds: int) -> Floats:
 
 
 def summed(rows: Floats, labels: Indices) -> Floats:
-    """(k, d): the sums of (n, d) rows by label, from 0 to k - 1."""
+    """Compute the (k, d) sums of (n, d) rows by label, from 0 to k - 1."""
     _, columns = rows.shape
     clusters = int(labels.max(initial=-1)) + 1
     place = labels[:, None] * columns + np.arange(columns)
@@ -120,14 +120,14 @@ class Mixture:
     config: Config
 
     def log_probability(self, scene: Scene, labels: Indices) -> float:
-        """The logarithm of the probability of a partition, (n,) labels, but for a constant."""
+        """Compute the log probability of a partition, (n,) labels, but for a constant."""
         evidence = self.log_evidence(summed(scene.rows, labels)).sum()
         is_together = labels[scene.edges[:, 0]] == labels[scene.edges[:, 1]]
         return float(evidence + scene.bonds[is_together].sum())
 
     def log_evidence(self, statistics: Floats) -> Floats:
-        """(k,): what each of k clusters adds to the logarithm of the probability, by its sufficient
-        statistics, (k, d); 0 for one without objects.
+        """Compute what each of k clusters adds to the logarithm of the probability, (k,), by its
+        sufficient statistics, (k, d); 0 for one without objects.
         """
         weights = self.config
         is_empty = statistics[:, COUNT] < 0.5
@@ -142,9 +142,9 @@ class Mixture:
         return evidence
 
     def bonds(self, is_crossed: Booleans, gaps: Floats) -> Floats:
-        """(e,): by how much more probable it is that two neighbours are of one cluster than of two,
-        as a logarithm: by whether a boundary is between them, and by the logarithm of how far apart
-        they are over the spacing of objects there.
+        """Compute by how much more probable it is that two neighbours are of one cluster than of
+        two, as a logarithm, (e,): by whether a boundary is between them, and by the logarithm of
+        how far apart they are over the spacing of objects there.
         """
         crossed = math.log(CROSSED_WITHIN / CROSSED_BETWEEN)
         clear = math.log((1 - CROSSED_WITHIN) / (1 - CROSSED_BETWEEN))
@@ -157,8 +157,8 @@ class Mixture:
 
 
 def _log_positions(statistics: Floats, count: Floats) -> Floats:
-    """(k,): the logarithm of the marginal likelihood of positions, and of the prior of the sizes of
-    clusters.
+    """Compute the logarithm of the marginal likelihood of positions, and of the prior of the sizes
+    of clusters, (k,).
     """
     scale_m2 = SUB_MAP_SD_M**2 * SCATTER_PRIOR_COUNT
     mean_count = MEAN_PRIOR_COUNT + count
@@ -181,8 +181,8 @@ def _log_positions(statistics: Floats, count: Floats) -> Floats:
 
 
 def _log_gamma_2(degrees: Floats | float) -> Floats:
-    """The logarithm of the bivariate gamma function at half the degrees of freedom, but for its
-    constant.
+    """Compute the logarithm of the bivariate gamma function at half the degrees of freedom, but for
+    its constant.
     """
     half = np.asarray(degrees) / 2
     logarithm: Floats = gammaln(half) + gammaln(half - 0.5)
@@ -190,7 +190,7 @@ def _log_gamma_2(degrees: Floats | float) -> Floats:
 
 
 def _log_spacings(statistics: Floats, count: Floats) -> Floats:
-    """(k,): the logarithm of the marginal likelihood of spacings."""
+    """Compute the logarithm of the marginal likelihood of spacings, (k,)."""
     mean_count = SPACING_MEAN_PRIOR_COUNT + count
     total = statistics[:, SPACING_SUM]
     scatter = statistics[:, SPACING_SQUARES] - total**2 / mean_count
@@ -208,7 +208,7 @@ def _log_spacings(statistics: Floats, count: Floats) -> Floats:
 
 
 def _log_functions(statistics: Floats) -> Floats:
-    """(k,): the logarithm of the marginal likelihood of the functions that are known."""
+    """Compute the logarithm of the marginal likelihood of the functions that are known, (k,)."""
     counts = statistics[:, FUNCTIONS:]
     kinds = counts.shape[1]
     if not kinds:

@@ -20,12 +20,12 @@ class Moves(NamedTuple):
     gains: Floats
 
     def select(self, chosen: Booleans | Indices) -> Moves:
-        """Some of the moves."""
+        """Choose some of the moves."""
         return Moves(self.objects[chosen], self.targets[chosen], self.gains[chosen])
 
 
 def best_moves(mixture: Mixture, scene: Scene, labels: Indices, min_gain: float) -> Moves:
-    """The best move of each object that gains at least so much by one."""
+    """Find the best move of each object that gains at least so much by one."""
     first, second = scene.edges.T
     is_between = labels[first] != labels[second]
     at_border = np.zeros(len(labels), bool)
@@ -70,7 +70,7 @@ def best_moves(mixture: Mixture, scene: Scene, labels: Indices, min_gain: float)
 
 
 def gain_most(scene: Scene, moves: Moves) -> Moves:
-    """The moves that gain more than those of all neighbours; of equal ones, the first."""
+    """Choose the moves that gain more than those of all neighbours; of equal ones, the first."""
     count = len(scene.rows)
     order = np.lexsort((moves.objects, -moves.gains))
     rank = np.full(count, count)

@@ -17,8 +17,8 @@ class Separation(Protocol):
     """Separates objects: boundaries as lines, or links that are cut."""
 
     def are_crossed(self, lines_m: Floats, clear_m: Floats | None = None) -> Booleans:
-        """(k,): whether a boundary is across each of (k, 2, 2) lines, farther than `clear_m` from
-        its ends, (k, 2).
+        """Decide whether a boundary is across each of (k, 2, 2) lines, (k,), farther than `clear_m`
+        from its ends, (k, 2).
         """
 
 
@@ -47,7 +47,7 @@ class Neighbourhood:
         self._set_spacings(np.ones(len(positions_m), bool))
 
     def append(self, position_m: Floats, clear_m: float) -> Indices:
-        """Add an object; which others it has for neighbours."""
+        """Add an object, and return which others are its neighbours."""
         near = neighbours_of(self.positions_m, position_m)
         is_parted = comes_between(self.positions_m, self.edges, position_m)
         number = len(self.positions_m)
@@ -70,13 +70,13 @@ class Neighbourhood:
         return near
 
     def inside(self, members: Booleans) -> Booleans:
-        """(e,): the pairs of neighbours of which both are members, (n,)."""
+        """Decide for each pair of neighbours, (e,), whether both are members, (n,)."""
         inside: Booleans = members[self.edges[:, 0]] & members[self.edges[:, 1]]
         return inside
 
     def gaps(self, chosen: Booleans) -> Floats:
-        """(k,): of the chosen pairs, (e,), the logarithm of how far apart they are over the spacing
-        of the one that stands more freely.
+        """Compute the logarithm of how far apart the chosen pairs, (e,), are over the spacing of
+        the one that stands more freely, (k,).
         """
         first, second = self.edges[chosen].T
         usual = np.maximum(self.spacings[first], self.spacings[second])
@@ -88,7 +88,7 @@ class Neighbourhood:
         return self._boundaries.are_crossed(lines_m, self._clear_m[edges])
 
     def _distances_of(self, edges: Indices) -> Floats:
-        """(e,): how far apart the two of a pair are, over the unit."""
+        """Compute how far apart the two of each pair are, over the unit, (e,)."""
         offset_m = self.positions_m[edges[:, 1]] - self.positions_m[edges[:, 0]]
         apart_m = np.hypot(offset_m[:, 0], offset_m[:, 1])
         distances: Floats = np.maximum(apart_m / self._unit_m, MIN_SPACING)

@@ -16,7 +16,7 @@ ROUNDING = 1e-9
 
 
 def neighbours(positions_m: Floats) -> Indices:
-    """(e, 2): the pairs of neighbours among (n, 2) positions, each once, the lower index first."""
+    """Find (e, 2) pairs of neighbours among (n, 2) positions, each once, the lower index first."""
     count = len(positions_m)
     nearest = min(NEAREST, count - 1)
     if nearest < 1:
@@ -42,7 +42,7 @@ def neighbours(positions_m: Floats) -> Indices:
 
 
 def neighbours_of(positions_m: Floats, point_m: Floats) -> Indices:
-    """(k,): which of (n, 2) positions are neighbours of a point (2,) that is none of them."""
+    """Find which of (n, 2) positions are neighbours of a point (2,) that is none of them, (k,)."""
     offsets_m = positions_m - point_m
     distance2 = (offsets_m**2).sum(axis=1)
     nearest = min(NEAREST, len(distance2))
@@ -61,7 +61,7 @@ def neighbours_of(positions_m: Floats, point_m: Floats) -> Indices:
 
 
 def comes_between(positions_m: Floats, edges: Indices, point_m: Floats) -> Booleans:
-    """(e,): whether a new point parts two neighbours, (e, 2)."""
+    """Decide for each pair of neighbours, (e, 2), whether a new point parts them, (e,)."""
     x_m, y_m = (positions_m - point_m).T.copy()
     first, second = edges.T
     dots = x_m[first] * x_m[second] + y_m[first] * y_m[second]
@@ -70,7 +70,7 @@ def comes_between(positions_m: Floats, edges: Indices, point_m: Floats) -> Boole
 
 
 def _is_neighbour(offsets_m: Floats) -> Booleans:
-    """(k, c): which of c objects, at (k, c, 2) from each of k, no other of them parts from it."""
+    """Decide, (k, c), which of c objects, at (k, c, 2) from each of k, no other parts from it."""
     squared = (offsets_m**2).sum(axis=2)
     products = offsets_m @ offsets_m.transpose(0, 2, 1)
 

@@ -36,27 +36,27 @@ class Grid(NamedTuple):
     side: float
 
     def placed(self, cells: Floats) -> Floats:
-        """(..., 2): where on the root map (..., 2) cells are."""
+        """Compute where on the root map (..., 2) cells are, (..., 2)."""
         return transform_from(self.pose, self.side * cells)
 
     def turned(self, cells: Floats) -> Floats:
-        """(..., 2): what (..., 2) steps from cell to cell are on the root map."""
+        """Compute what (..., 2) steps from cell to cell are on the root map, (..., 2)."""
         return rotate(self.side * cells, self.pose[2])
 
     @property
     def parts(self) -> int:
-        """Into how many parts a cell is divided, each at most a cell of the root map wide."""
+        """Count the parts of a cell's side, each at most a cell of the root map wide."""
         return _parts(self.side)
 
     @property
     def middles(self) -> Floats:
-        """(parts,): where in a cell the middles of its parts are, from its own middle."""
+        """Return where in a cell the middles of its parts are, from its own middle, (parts,)."""
         middles: Floats = (np.arange(self.parts) + 0.5) / self.parts - 0.5
         return middles
 
 
 def cells_below(grid: Grid, extent: Extent) -> Extent:
-    """The cells of the root map that those of a rectangle follow from."""
+    """Find the cells of the root map that those of a rectangle are computed from."""
     wide = extent.grown(BESIDE)
     (low_i, low_j), (high_i, high_j) = wide.lower, wide.upper
     corners = [[low_i, low_j], [low_i, high_j], [high_i, low_j], [high_i, high_j]]
@@ -68,15 +68,15 @@ def cells_below(grid: Grid, extent: Extent) -> Extent:
 
 
 def resampled(window: Window, grid: Grid, extent: Extent) -> Singles:
-    """(10, w, h): the COLUMNS of a rectangle of the grid's cells, from a window of the root map
-    with the cells below.
+    """Compute the COLUMNS of a rectangle of the grid's cells, (10, w, h), from a window of the root
+    map with the cells below.
 
-    A place is as much road as any place in it, and an obstacle as far as its places are on average.
-    A link is as free as the best of the rows of links that lead to the neighbour's middle, and a
-    row as its weakest link; so is its evidence. Diagonally there is one row; otherwise there are as
-    many as places beside each other in a cell, each leading aside, along the link, and back. So no
-    route over the grid crosses what no route over the root map crosses. No link leads to where
-    something stands.
+    A cell is as much road as the most road-like place in it, and as much an obstacle as its places
+    are on average. A link is as free as the best of the rows of links that lead to the neighbour's
+    middle, and a row as its weakest link; so is its evidence. Diagonally there is one row;
+    otherwise there are as many as places beside each other in a cell, each leading aside, along the
+    link, and back. So no route over the grid crosses what no route over the root map crosses. No
+    link leads to where something stands.
     """
     places = _PlacesBelow(window, grid, extent)
     road = window.column(PlaceColumn.ROAD)
@@ -105,7 +105,9 @@ class _Steps(NamedTuple):
     is_still: Booleans
 
     def best(self, values: Singles, within: float) -> Singles:
-        """(w, h): of the rows' least values of links, (4, ...), the greatest; `within` a place."""
+        """Find the greatest of the rows' least values of links, (4, ...), of each cell, (w, h); it
+        is `within` if a row stays in one place.
+        """
         taken = values.take(self.link)
         taken[self.is_still] = np.inf
         best = taken.min(axis=-1).max(axis=-1)
@@ -127,7 +129,7 @@ class _PlacesBelow:
         self._shape = window.shape
 
     def inside(self) -> Indices:
-        """(w, h, parts ** 2): the places in each cell, as numbers in flat columns."""
+        """Return the places in each cell, as numbers in flat columns, (w, h, parts ** 2)."""
         middles = self._grid.middles
         offsets = np.stack(np.meshgrid(middles, middles), axis=-1)
         i, j = self._nearest(offsets.reshape(-1, 2))
@@ -135,7 +137,7 @@ class _PlacesBelow:
         return numbers
 
     def steps(self, offset: Indices) -> _Steps:
-        """The steps of all rows along the links of the cells in one direction."""
+        """Find the steps of all rows along the links of the cells in one direction."""
         # Along neither axis of the root map does a step lead farther than to the next cell.
         along = self._grid.turned(offset.astype(np.float64))
         parts = _parts(float(np.abs(along).max()))
@@ -150,7 +152,7 @@ class _PlacesBelow:
         return _Steps(_LINK[code] * math.prod(self._shape) + owner, code == _STILL)
 
     def _nearest(self, offsets: Floats) -> tuple[Indices, Indices]:
-        """(w, h, ...) each: the indices of the places at (..., 2) offsets in each of the cells."""
+        """Find the indices, (w, h, ...) each, of the places at (..., 2) offsets in each cell."""
         width, height, _ = self._points.shape
         turned = self._grid.turned(offsets)
         added = (1,) * (turned.ndim - 1)
@@ -162,13 +164,13 @@ class _PlacesBelow:
 
 
 def _parts(length: float) -> int:
-    """Into how many parts of at most 1 a length is divided."""
+    """Return into how many parts of at most 1 a length is divided."""
     return max(1, math.ceil(length - ROUNDING))
 
 
 def _rows(offset: Indices, asides: Floats, parts: int) -> Floats:
-    """(rows, n, 2): the points of rows from the middle of a cell to that of the one at `offset`,
-    which lead aside, along in so many parts, and back.
+    """Compute the points of rows from the middle of a cell to that of the one at `offset`,
+    (rows, n, 2). Rows lead aside, along in so many parts, and back.
     """
     along = np.arange(parts + 1) / parts
     # No row is farther aside than half a cell.
@@ -183,13 +185,13 @@ def _rows(offset: Indices, asides: Floats, parts: int) -> Floats:
 
 
 def _step(cells: Indices) -> Indices:
-    """(..., n - 1): whether each of n cells in a row is before the next, 2, the same, or after."""
+    """Compare each of n cells in a row to the next, (..., n - 1): 2 before it, 1 as it, 0 after."""
     return np.diff(cells).clip(-1, 1) + 1
 
 
 def _links_by_step() -> tuple[Indices, Booleans]:
-    """(9,) each: by how a step leads along both axes, the number of the link that it takes, and
-    whether that belongs to the place where the step ends.
+    """Return, by how a step leads along both axes, the number of the link that it takes, and
+    whether that belongs to the place where the step ends, (9,) each.
     """
     link = np.zeros(9, np.int64)
     is_back = np.zeros(9, bool)

@@ -21,8 +21,8 @@ MIN_GAIN = 1e-6
 
 
 def partition(mixture: Mixture, scene: Scene, labels: Indices | None = None) -> Indices:
-    """(n,): the labels of the clusters of a probable partition, from 0, found from `labels`, or
-    if there are none from every object for itself.
+    """Find a probable partition, and return the labels of its clusters, (n,), from 0. Start from
+    `labels`, or if there are none from every object for itself.
     """
     if labels is None:
         labels = np.arange(len(scene.rows))
@@ -40,7 +40,7 @@ def partition(mixture: Mixture, scene: Scene, labels: Indices | None = None) -> 
 
 
 def compact(labels: Indices) -> Indices:
-    """(n,): the same partition with labels from 0 without a gap, in their order."""
+    """Renumber the labels of a partition, (n,), from 0 without a gap, in their order."""
     _, numbers = np.unique(labels, return_inverse=True)
     compacted: Indices = numbers.astype(np.int64)
     return compacted
@@ -138,10 +138,10 @@ def part_clusters(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
 
 
 def parts(mixture: Mixture, scene: Scene) -> Indices:
-    """(n,): in which part of one cluster each of its objects is better, from 0; 0 of all if the
-    cluster is best as it is.
+    """Find in which part of one cluster each of its objects is better, (n,), from 0; 0 of all if
+    the cluster is best as it is.
 
-    It may have as many parts as there are when no two gain by merging, or two.
+    It may have two parts, or as many as there are when no two gain by merging.
     """
     best = np.zeros(len(scene.rows), np.int64)
     most = mixture.log_probability(scene, best) + MIN_GAIN

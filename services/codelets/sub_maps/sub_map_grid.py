@@ -26,8 +26,8 @@ SETTLED_CYCLES = 25
 
 
 def with_places(graph: Graph, cycle: int) -> list[Map]:
-    """The sub-maps that have place nodes in a cycle, by number: those whose frame has settled and
-    whose cells are neither smaller than the root map's nor larger than a sub-map's ever are.
+    """Return the sub-maps that have place nodes in a cycle, by number: their frame has settled, and
+    their cells are neither smaller than the root map's nor larger than a sub-map's ever are.
     """
     root_cell_m = graph.cell_m()
     return [node for node in sub_maps_of(graph) if _has_places(node, root_cell_m, cycle)]
@@ -47,14 +47,14 @@ def _has_places(node: Map, root_cell_m: float, cycle: int) -> bool:
 
 
 def area_of(node: Map) -> Extent:
-    """The cells of a sub-map whose middles lie in its area."""
+    """Return the cells of a sub-map whose middles lie in its area."""
     high_i = math.floor(node.width_m / 2 / node.cell_m)
     high_j = math.floor(node.height_m / 2 / node.cell_m)
     return Extent((-high_i, -high_j), (high_i + 1, high_j + 1))
 
 
 def cells_around(node: Map, position_m: Floats, reach_m: float) -> Extent:
-    """The cells of a sub-map's area within reach of a position (2,) on the root map."""
+    """Return the cells of a sub-map's area within reach of a position (2,) on the root map."""
     middle_m = transform_to(pose_of(node), position_m)
     first_i, first_j = np.floor((middle_m - reach_m) / node.cell_m).astype(int).tolist()
     last_i, last_j = np.ceil((middle_m + reach_m) / node.cell_m).astype(int).tolist()
@@ -69,7 +69,7 @@ def block_count(node: Map, graph: Graph) -> int:
 
 
 def block(node: Map, number: int, graph: Graph) -> Extent:
-    """The cells of one block, by its number from 0."""
+    """Return the cells of one block, by its number from 0."""
     side = _block_side(node, graph)
     area = area_of(node)
     _, rows = _blocks(node, graph)
@@ -81,7 +81,7 @@ def block(node: Map, number: int, graph: Graph) -> Extent:
 
 
 def updated(node: Map, extent: Extent, graph: Graph) -> list[Operation]:
-    """The places of a sub-map that change in a rectangle of its area."""
+    """Write the places of a sub-map that change in a rectangle of its area."""
     if not all(extent.shape):
         return []
 
@@ -95,7 +95,7 @@ def updated(node: Map, extent: Extent, graph: Graph) -> list[Operation]:
 
 
 def _block_side(node: Map, graph: Graph) -> int:
-    """The cells of a sub-map along the side of a block."""
+    """Return how many cells of a sub-map lie along the side of a block."""
     return max(1, int(BLOCK * graph.cell_m() / node.cell_m))
 
 
@@ -107,7 +107,7 @@ def _blocks(node: Map, graph: Graph) -> tuple[int, int]:
 
 
 def _overlap(a: Extent, b: Extent) -> Extent:
-    """The cells that are in both."""
+    """Return the cells that are in both."""
     first_i, first_j = np.maximum(a.lower, b.lower).tolist()
     last_i, last_j = np.minimum(a.upper, b.upper).tolist()
     return Extent((first_i, first_j), (last_i, last_j))

@@ -46,7 +46,7 @@ def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
 
 
 def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
-    """The places of sub-maps that have changed."""
+    """Update the places of sub-maps that have changed."""
     agent = graph.agent
     if agent is None:
         raise MessageError(f"task {task.task_id}: the graph has no self node")

@@ -83,8 +83,8 @@ class SubMaps:
         self._relabel(everyone, found)
 
     def add(self, position_m: Floats, function: int = -1, clear_m: float = 0.0) -> int:
-        """The label of one more object, at (2,). Sub-maps near it may merge, part or exchange
-        objects.
+        """Add an object, at (2,), and return its label. Sub-maps near it may merge, part or
+        exchange objects.
         """
         near = self._near.append(position_m, clear_m)
         row = self._rows_of(position_m[None], np.array([function]))
@@ -164,11 +164,12 @@ def _has_grown(size: int, growth: float) -> bool:
 
 
 def kept_labels(before: Indices, after: Indices, next_label: int) -> Indices:
-    """(n,): the partition `after` with the labels of `before`, NEW of objects that had none.
+    """Give the partition `after` the labels of `before`, (n,), which are NEW for objects that had
+    none.
 
-    Each cluster keeps the label of the one that it shares most objects with; of several that claim
-    one label, and of several labels for one cluster, the most objects in all decide. Clusters that
-    are left over get new labels from `next_label`, in the order of their first objects.
+    Each cluster keeps the label of the one that it shares most objects with. If several claim one
+    label, or several labels are there for one cluster, the most objects in all decide. Clusters
+    that are left over get new labels from `next_label`, in the order of their first objects.
     """
     names, number = np.unique(after, return_inverse=True)
     had_label = before != NEW

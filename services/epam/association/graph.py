@@ -59,7 +59,7 @@ class AssociativeGraph:
 
     @property
     def updated_ns(self) -> int:
-        """The stamp of the broadcast from which was learned last, 0 before the first."""
+        """Return the stamp of the last broadcast that was learned from, 0 before the first."""
         return self._updated_ns
 
     def learn(
@@ -196,16 +196,16 @@ class AssociativeGraph:
         self._weights[sources, targets] = values
 
     def _remaining_share(self, stamp_ns: int) -> float:
-        """The share of activation that remains at `stamp_ns`."""
+        """Compute the share of activation that remains at `stamp_ns`."""
         passed_s = max(0, stamp_ns - self._updated_ns) / 1e9
         return float(0.5 ** (passed_s / self._config.half_life_s))
 
     def _rows(self, names: Iterable[str]) -> list[int]:
-        """The rows of those names that have one."""
+        """Return the rows of those names that have one."""
         return [self._index[name] for name in names if name in self._index]
 
     def _is_feeling(self) -> Booleans:
-        """(n,), true for nodes that are feelings."""
+        """Return which nodes are feelings, (n,)."""
         return np.array([name in FEELINGS for name in self._index], np.bool_)
 
     def _add(self, name: str) -> None:

@@ -52,7 +52,7 @@ class Primer:
 
     @property
     def is_ready(self) -> bool:
-        """True once all is known that the next view is primed by."""
+        """Return whether all is known that the next view is primed by."""
         return len(self._views_ns) < BEHIND or self._competition_ns >= self._views_ns[0]
 
     def begin(self, view_ns: int) -> Associations | None:

@@ -110,7 +110,7 @@ def locate(silhouettes: list[Silhouette], camera: Calibration) -> list[ObjectPos
 
 
 def _stacked(silhouettes: list[Silhouette], camera: Calibration) -> FootprintProblem:
-    """The problem of all silhouettes, at COLUMNS evenly spaced columns of each."""
+    """Stack all silhouettes into one problem, at COLUMNS evenly spaced columns of each."""
     columns = np.empty((len(silhouettes), COLUMNS))
     disparity_px = np.empty((len(silhouettes), COLUMNS))
     for row, silhouette in enumerate(silhouettes):
@@ -138,7 +138,7 @@ def _stacked(silhouettes: list[Silhouette], camera: Calibration) -> FootprintPro
 
 
 def _starts(objects: FootprintProblem) -> Floats:
-    """ORIENTATIONS starts an object (s * ORIENTATIONS, 3), behind the middle of the seen wall."""
+    """Place ORIENTATIONS starts an object, (s * ORIENTATIONS, 3), behind the seen wall's middle."""
     camera = objects.camera
     right_px = objects.edge_px.mean(1) - camera.cx_px
     slope = np.asarray(right_px / camera.fx_px)
@@ -159,7 +159,7 @@ def _starts(objects: FootprintProblem) -> Floats:
 
 
 def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
-    """Levenberg-Marquardt with Huber's weights (1964), every start with a damping of its own."""
+    """Solve by Levenberg-Marquardt with Huber's weights (1964), each start with its own damping."""
     copies = problem.copies()
     best = parameters
     residuals, jacobian = linearized(best, copies)
@@ -199,7 +199,7 @@ def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
 
 
 def _weighted_normal(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats]:
-    """The derivatives (s, r, 3) times the weights (s, r), and the normal matrices (s, 3, 3)."""
+    """Weight the derivatives (s, r, 3) by (s, r), and compute the normal matrices (s, 3, 3)."""
     weighted = jacobian * weight[..., None]
     normal = np.einsum("sri,srj->sij", weighted, jacobian)
     return weighted, np.asarray(normal)
@@ -219,8 +219,8 @@ def _huber_cost(residuals: Floats) -> Floats:
 
 
 def _covariances(solution: _Solution, problem: FootprintProblem) -> Floats:
-    """(s, 3, 3): of independent errors, of a bias that all disparities share, and of the centre if
-    an edge is hidden.
+    """Add up the covariances (s, 3, 3) of independent errors, of a bias that all disparities share,
+    and of the centre if an edge is hidden.
     """
     prior = np.diag([1e-4, 1e-4, 1e-2])
     independent = np.linalg.inv(solution.normal + prior)
@@ -234,7 +234,7 @@ def _covariances(solution: _Solution, problem: FootprintProblem) -> Floats:
 
 
 def _outer(vectors: Floats) -> Floats:
-    """(s, k, k): the outer product of each of (s, k) vectors with itself."""
+    """Compute the outer product of each of (s, k) vectors with itself, (s, k, k)."""
     columns = vectors[:, :, None]
     rows = vectors[:, None, :]
     return columns * rows
@@ -243,8 +243,8 @@ def _outer(vectors: Floats) -> Floats:
 def _mean_pose(
     parameters: Floats, costs: Floats, covariances: Floats, misfit: float, camera: Calibration
 ) -> ObjectPose:
-    """The mean over all orientations, weighted by likelihood, as bearing and range from the robot,
-    with the standard deviations of this mixture.
+    """Average over all orientations, weighted by likelihood. Return bearing and range from the
+    robot, with the standard deviations of this mixture.
     """
     likelihood = np.exp(-0.5 * (costs - costs.min()))
     weight = np.asarray(likelihood / likelihood.sum())

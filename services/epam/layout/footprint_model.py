@@ -60,7 +60,7 @@ class FootprintProblem:
 
 
 def _residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
-    """(s, COLUMNS + 2) residuals in standard deviations, of (s, 3) parameters."""
+    """Compute the (s, COLUMNS + 2) residuals, in standard deviations, of (s, 3) parameters."""
     camera = problem.camera
     focal_baseline = camera.fx_px * camera.baseline_m
     disparity_px = focal_baseline * _inverse_depths(parameters, problem)
@@ -90,7 +90,7 @@ def _residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
 
 
 def _inverse_depths(parameters: Floats, problem: FootprintProblem) -> Floats:
-    """1 / depth in metres, (s, COLUMNS), at which the rays meet the sides that face the camera."""
+    """Return 1 / depth in metres, (s, COLUMNS), where the rays meet sides that face the camera."""
     x, z, orientation = parameters.T
     cos = np.cos(orientation)
     sin = np.sin(orientation)
@@ -115,7 +115,7 @@ def _inverse_depths(parameters: Floats, problem: FootprintProblem) -> Floats:
 
 
 def linearized(parameters: Floats, copies: FootprintProblem) -> tuple[Floats, Floats]:
-    """Residuals (s, r) and their derivatives (s, r, 3), by forward differences, of (s, 3)
+    """Compute residuals (s, r) and their derivatives (s, r, 3), by forward differences, of (s, 3)
     `parameters` and the copies of their problem.
     """
     evaluated = [parameters]

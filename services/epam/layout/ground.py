@@ -73,8 +73,8 @@ def project(likelihood: Singles, depth_m: Singles, camera: Calibration) -> tuple
 def _crossings(
     likelihood: Singles, mask: Booleans, visible_ground: Booleans
 ) -> tuple[Floats, Floats]:
-    """Rows and fractional columns at which the likelihood is 0.5 between neighbours in a row, if
-    both show visible ground.
+    """Find the rows and fractional columns at which the likelihood is 0.5 between neighbours in a
+    row, if both show visible ground.
     """
     is_visible = visible_ground[:, :-1] & visible_ground[:, 1:]
     changes = mask[:, :-1] != mask[:, 1:]
@@ -89,7 +89,7 @@ def _crossings(
 def _on_ground(
     rows: npt.ArrayLike, columns: npt.ArrayLike, plane: GroundPlane, camera: Calibration
 ) -> Floats:
-    """The ground points (n, 2) that these pixels show; those beyond MAX_RANGE_M are left out."""
+    """Project these pixels onto the ground, (n, 2); leave out those beyond MAX_RANGE_M."""
     disparity_px = plane.disparity_px(rows, columns, camera)
     near = disparity_px > focal_baseline(camera) / MAX_RANGE_M
     depth_m = focal_baseline(camera) / disparity_px[near]

@@ -86,7 +86,7 @@ def fit(mask: Booleans, disparity_px: Floats, camera: Calibration) -> GroundPlan
 
 
 def focal_baseline(camera: Calibration) -> float:
-    """Disparity in pixels times depth in metres."""
+    """Compute the product of a disparity in pixels and its depth in metres."""
     return camera.fx_px * camera.baseline_m
 
 

@@ -131,7 +131,7 @@ def network_input(small: Bytes) -> Singles:
 
 
 def _large_components(mask: Booleans, min_share: float) -> Booleans:
-    """The connected components of `mask` that cover at least `min_share` of the image, (h, w)."""
+    """Keep the connected components of `mask`, (h, w), that cover at least `min_share` of it."""
     found = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=4)
     _, component, stats, _ = found
 

@@ -55,8 +55,8 @@ def descriptors(image: Bytes) -> Bytes | None:
 
 
 def _patches(image: Bytes) -> Singles:
-    """The cells of `image` for each of SHIFTS and each channel, in patches of PATCH by PATCH cells:
-    (shift, channel, row of patches, PATCH, column of patches, PATCH).
+    """Divide the cells of `image`, for each of SHIFTS and each channel, into patches of PATCH by
+    PATCH cells: (shift, channel, row of patches, PATCH, column of patches, PATCH).
     """
     thumbnail = cv2.resize(image, (COLUMNS, ROWS), interpolation=cv2.INTER_AREA)
     above = thumbnail[:ROWS_ABOVE_HORIZON].astype(np.float32)

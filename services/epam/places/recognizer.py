@@ -67,7 +67,7 @@ class PlaceRecognizer:
 
     @property
     def all(self) -> Iterator[RememberedView]:
-        """Every view remembered, the oldest first."""
+        """Return every view remembered, the oldest first."""
         return iter(self._views)
 
     def observe(
@@ -124,8 +124,8 @@ class PlaceRecognizer:
         self._last_vector = vectors[-1]
 
     def _update_belief(self, vectors: Singles) -> None:
-        """One step of the filter: prediction, then the evidence of `vectors`, by the most similar
-        turn of the view.
+        """Advance the filter by one step: prediction, then the evidence of `vectors`, by the most
+        similar turn of the view.
         """
         if not self._views:
             return
@@ -155,7 +155,7 @@ class PlaceRecognizer:
         self._p_new = p_new / total
 
     def _likeliest_match(self) -> list[PlaceMatch]:
-        """The likeliest remembered view, if its probability with its neighbours' reaches the
+        """Return the likeliest remembered view, if its probability with its neighbours' reaches the
         threshold.
         """
         if not self._views:

@@ -84,7 +84,7 @@ def outline_px(segment: Segment) -> list[tuple[int, int]]:
 
 
 def _largest_piece(shown: Bytes, bridged_px: int) -> Booleans:
-    """The largest connected piece of `shown` (h, w), to which gaps of fewer than `bridged_px`
+    """Find the largest connected piece of `shown` (h, w), to which gaps of fewer than `bridged_px`
     columns belong.
     """
     # At the image's border, closing would fill the space between it and the segment.

@@ -91,8 +91,8 @@ def crop(
 
 
 def _overlap(start: int, length: int, size: int) -> tuple[slice, slice]:
-    """The part of so many pixels from `start` on that is inside an image of `size`: where it is in
-    the image, and where among those pixels.
+    """Find which of `length` pixels from `start` on are inside an image of `size`: where these are
+    in the image, and where among the `length` pixels.
     """
     first = max(start, 0)
     last = min(start + length, size)
@@ -100,7 +100,7 @@ def _overlap(start: int, length: int, size: int) -> tuple[slice, slice]:
 
 
 def _resized(square: Singles) -> Singles:
-    """`square` with sides of SIDE_PX."""
+    """Resize `square` to sides of SIDE_PX."""
     interpolation = cv2.INTER_AREA if len(square) > SIDE_PX else cv2.INTER_LINEAR
     resized = cv2.resize(square, (SIDE_PX, SIDE_PX), interpolation=interpolation)
     return resized.astype(np.float32, copy=False)

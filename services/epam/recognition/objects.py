@@ -100,8 +100,8 @@ class Recognition:
 
     @property
     def known(self) -> bool:
-        """True if the label is likelier than an unknown building and background together, as far as
-        the view alone goes.
+        """Return whether the label is likelier than an unknown building and background together, as
+        far as the view alone goes.
         """
         return self.evidence > self.unknown + self.background
 
@@ -147,7 +147,7 @@ class ObjectRecognizer:
 
     @property
     def labels(self) -> list[str]:
-        """Every label that a segment may be recognized as: those taught, then those learned."""
+        """Return all labels that a segment may be recognized as: taught ones, then learned ones."""
         return [*self._prototypes.names, *dict.fromkeys(self._labels)]
 
     def is_taught(self, label: str) -> bool:
@@ -214,12 +214,12 @@ class ObjectRecognizer:
 
     @property
     def sizes_m(self) -> dict[str, tuple[float, float, float]]:
-        """The sides of the footprint, the longer first, and the height, of each label taught."""
+        """Return each taught label's footprint sides, the longer first, and height."""
         return dict(zip(self._prototypes.names, self._prototypes.size_m, strict=True))
 
     @property
     def learned(self) -> list[tuple[str, Singles]]:
-        """Every label and embedding learned since the teaching, in order."""
+        """Return every label and embedding learned since the teaching, in order."""
         return list(zip(self._labels, self._embeddings, strict=True))
 
 
@@ -265,8 +265,8 @@ def posteriors(
 
 
 def _posteriors(possible: Floats, building: npt.ArrayLike) -> Floats:
-    """The posterior (..., n + 2) of each label, an unknown building and background, from the log
-    odds (..., n) of each label over an unknown building.
+    """Compute the posterior (..., n + 2) of each label, an unknown building and background, from
+    the log odds (..., n) of each label over an unknown building.
     """
     *leading, _ = possible.shape
     unknown = np.zeros((*leading, 1))
@@ -281,7 +281,7 @@ def _posteriors(possible: Floats, building: npt.ArrayLike) -> Floats:
 
 
 def _log_odds(taught: Singles, novel: Singles, prototypes: Prototypes) -> Floats:
-    """The log odds (..., n + m) of each label, taught or learned, over an unknown building."""
+    """Compute log odds (..., n + m) of each label, taught or learned, over an unknown building."""
     taught_odds = prototypes.sharpness * (taught - prototypes.unknown)
     novel_odds = prototypes.novel_sharpness * (novel - prototypes.novel_unknown)
     return np.concatenate([taught_odds, novel_odds], axis=-1, dtype=np.float64)

@@ -57,7 +57,7 @@ class Segment:
 
     @property
     def area_px(self) -> int:
-        """The number of its pixels."""
+        """Return the number of its pixels."""
         return int(self.mask.sum())
 
 
@@ -160,7 +160,7 @@ def divided(output: Singles, size: tuple[int, ...]) -> list[Segment]:
 
 
 def _instances(output: Singles) -> npt.NDArray[np.intp]:
-    """The number of the object at each pixel, -1 for none, by the network's output (4, h, w)."""
+    """Number the object at each pixel, -1 for none, by the network's output (4, h, w)."""
     log_odds, centre, right, down = output
     numbers = np.full(log_odds.shape, -1, np.intp)
     building = log_odds > np.log(MIN_BUILDING / (1 - MIN_BUILDING))
@@ -188,8 +188,8 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
 
 
 def _joined(numbers: npt.NDArray[np.intp], pointed_at: Floats) -> npt.NDArray[np.intp]:
-    """`numbers` (h, w) of objects, in which pieces of one object have the same number: those that
-    point to the same row and column, `pointed_at` (h, w, 2), where they meet.
+    """Give pieces of one object the same number in `numbers` (h, w): those that point to the same
+    row and column, `pointed_at` (h, w, 2), where they meet.
     """
     area_px = np.bincount(numbers[numbers >= 0])
     count = len(area_px)

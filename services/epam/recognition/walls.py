@@ -48,12 +48,12 @@ class Walls:
 
     @property
     def whole(self) -> bool:
-        """True if neither the image's border nor another object cuts the object."""
+        """Return whether neither the image's border nor another object cuts the object."""
         return self.left_true and self.right_true
 
     @property
     def middle(self) -> float:
-        """The column in the middle of the segment."""
+        """Return the column in the middle of the segment."""
         return (self.left + self.right) / 2
 
     def silhouette(self, sides_m: tuple[float, float]) -> Silhouette:
@@ -144,8 +144,8 @@ def walls(segment: Segment, disparity_px: Singles) -> Walls | None:
 
 
 def _column_medians(values: Singles) -> Singles:
-    """The upper median of the positive values in each column of (h, w), 0 if there are fewer than
-    MIN_PIXELS.
+    """Compute the upper median of the positive values in each column of (h, w), 0 if there are
+    fewer than MIN_PIXELS.
     """
     height, width = values.shape
     count = (values > 0).sum(0)
@@ -160,8 +160,8 @@ def _column_medians(values: Singles) -> Singles:
 
 
 def _truly_ends(segment: Segment, disparity_px: Singles, medians_px: Singles, outward: int) -> bool:
-    """True if the object itself ends on that side (-1 left, 1 right), and is neither hidden by
-    something nearer nor cut by the view.
+    """Decide whether the object itself ends on that side (-1 left, 1 right), and is neither hidden
+    by something nearer nor cut by the view.
 
     On the left, the view ends where the right camera's does: as many columns in as the disparity.
     """

@@ -45,7 +45,7 @@ class EpisodicConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_f
             ge=0,
             le=1e6,
             description="Time since its end after which an episode of this run may be recalled, "
-            "in s",
+            "in s.",
         ),
     ] = 60.0
     refractory_cycles: Annotated[
@@ -53,6 +53,6 @@ class EpisodicConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_f
         Meta(
             ge=0,
             le=100_000,
-            description="Cycles after an episode was offered in which no other is",
+            description="Cycles after an episode was offered in which no other is.",
         ),
     ] = 50

@@ -46,7 +46,7 @@ class Corrections:
         self._waiting = graph.get(Correction, CORRECTION_ID)
 
     def take(self) -> list[Floats]:
-        """The rows of the corrections that were applied, (n, 7) each, the first one first."""
+        """Take the rows of the corrections that were applied, (n, 7) each, the first one first."""
         applied = self._applied
         self._applied = []
         return applied
@@ -63,7 +63,7 @@ class Shift:
         self._nearest = cKDTree(self._old[:, :2])
 
     def __call__(self, places_m: list[Position]) -> list[Position]:
-        """Where places are after the correction."""
+        """Return where places are after the correction."""
         at_m = np.array(places_m)
         _, nearest = self._nearest.query(at_m)
         moved_m = move_with(at_m, self._old[nearest], self._new[nearest])

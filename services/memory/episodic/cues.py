@@ -49,8 +49,8 @@ class EpisodicCues:
             self._stored.put(number, vector)
 
     def recalled(self, cue: StoredEpisode, is_wanted: Callable[[int], bool]) -> Found | None:
-        """The best match, of the episodes that are wanted, that a cue completes to at its place or
-        one beside it; None if it is none.
+        """Complete a cue, at its place and those beside it, to the wanted episode that matches it
+        best; None if there is none.
         """
         found = []
         for vector in cues(cue, self._items):

@@ -21,18 +21,18 @@ CELL_M = 2 * PLACE_M
 
 
 def encoded(episode: StoredEpisode, items: ItemMemory) -> Bytes:
-    """The vector of an episode.
+    """Encode an episode as a vector.
 
     It is the bundle of the episode's content, of its place, and of its path, a sequence with the
     last place first, each bound to its role, and all to the place and its map. What looks alike
-    elsewhere is so unrelated: else memory would complete every cue to what is usual in a town.
+    elsewhere is thus unrelated: else memory would complete every cue to what is usual in a town.
     """
     here = _cell((episode.x_m, episode.y_m))
     return bind(_content(episode, items), _place(here, episode, items), items.values)
 
 
 def cues(episode: StoredEpisode, items: ItemMemory) -> list[Bytes]:
-    """The vectors of an episode as it would be at the cells within half of PLACE_M."""
+    """Return the vectors of an episode as it would be at the cells within half of PLACE_M."""
     content = _content(episode, items)
     cells: dict[str, None] = {}
     for dx_m in (0.0, -PLACE_M / 2, PLACE_M / 2):
@@ -43,13 +43,13 @@ def cues(episode: StoredEpisode, items: ItemMemory) -> list[Bytes]:
 
 
 def squares(episode: StoredEpisode) -> list[str]:
-    """The squares that stand for its places in the vector of an episode, on its map."""
+    """Return the squares that stand for its places in the vector of an episode, on its map."""
     places_m = [(episode.x_m, episode.y_m), *episode.path]
     return [episode.map, *(_cell(at_m) for at_m in places_m)]
 
 
 def _cell(at_m: tuple[float, float]) -> str:
-    """The name of the square that stands for the places in it."""
+    """Name the square that stands for the places in it."""
     x_m, y_m = at_m
     return f"{math.floor(x_m / CELL_M)} {math.floor(y_m / CELL_M)}"
 

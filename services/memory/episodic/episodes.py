@@ -33,18 +33,18 @@ class Episodes:
 
     @property
     def known(self) -> Mapping[int, KeptEpisode]:
-        """All episodes by their numbers."""
+        """Return all episodes by their numbers."""
         return MappingProxyType(self._known)
 
     def restore(self, records: Iterable[StoredRecord]) -> None:
-        """Know episodes that are stored."""
+        """Take up episodes that are stored."""
         for record in records:
             if is_episode(record):
                 self._known[record.number] = record
                 self._newest = max(self._newest, record.number)
 
     def next_number(self) -> int:
-        """A number that no episode has had since the start."""
+        """Return a number that no episode has had since the start."""
         self._newest += 1
         return self._newest
 
@@ -55,7 +55,7 @@ class Episodes:
             self._changed.add(episode.number)
 
     def forget(self, number: int) -> None:
-        """Forget the episode of a number, where there is one."""
+        """Forget the episode of a number, if there is one."""
         forgotten = self._known.pop(number, None)
         self._changed.discard(number)
         if forgotten is not None:
@@ -100,7 +100,7 @@ class Episodes:
             self.forget(number)
 
     def relocate(self, moved: Callable[[KeptEpisode], KeptEpisode | None]) -> set[int]:
-        """Put episodes elsewhere, or forget them where that is None. The numbers of those whose
+        """Put episodes elsewhere, or forget them if that is None. Return the numbers of those whose
         vectors are others now.
         """
         relocated = set()
@@ -121,7 +121,7 @@ class Episodes:
         return relocated
 
     def take_changes(self) -> Changes:
-        """What is not stored yet as it is: after this, all is."""
+        """Take all that is not stored yet as it is; after this, everything counts as stored."""
         records: list[StoredRecord] = [self._known[number] for number in sorted(self._changed)]
         changes = Changes(records, self._forgotten)
         self._changed = set()
@@ -129,11 +129,11 @@ class Episodes:
         return changes
 
     def _activation(self, episode: TransientEpisode, now_ns: int) -> float:
-        """Linear decay, as in LIDA's framework."""
+        """Compute an episode's activation now, by linear decay as in LIDA's framework."""
         hours = max(0, now_ns - episode.active_ns) / HOUR_NS
         return max(0.0, episode.activation - self._config.decay_per_h * hours)
 
 
 def is_episode(record: StoredRecord) -> TypeGuard[KeptEpisode]:
-    """Whether a record is of an episode, in either memory."""
+    """Decide whether a record is of an episode, in either memory."""
     return isinstance(record, KeptEpisode)

@@ -61,7 +61,7 @@ class EpisodicMemory:
         self._offered_visit = 0
 
     def restore(self, records: Iterable[StoredRecord]) -> None:
-        """Know the episodes that the database holds."""
+        """Take up the episodes that the database holds."""
         self._episodes.restore(records)
         if not self._has_begun:
             runs = [episode.run for episode in self._episodes.known.values()]
@@ -79,7 +79,7 @@ class EpisodicMemory:
                     self._map = record.map
 
     def learned(self) -> list[StoredRecord]:
-        """The episodes of this run."""
+        """Return the episodes of this run."""
         return [each for each in self._episodes.known.values() if each.run == self._run]
 
     def note(self, delta: Delta) -> None:
@@ -116,7 +116,7 @@ class EpisodicMemory:
             self._join(root.remembered)
 
     def changes(self, map_name: str, now_ns: int) -> Changes:
-        """What is to be stored, with the root map called `map_name`."""
+        """Return what is to be stored, with the root map called `map_name`."""
         self._map = map_name
         self._episodes.consolidate(self._run, now_ns)
         for visit in self._visits:
@@ -127,7 +127,7 @@ class EpisodicMemory:
         return self._episodes.take_changes()
 
     def recall(self, cycle: int, now_ns: int) -> nodes.Episode | None:
-        """The episode that what is conscious here reminds of, where that is new; one in a visit."""
+        """Recall the episode that what is conscious here reminds of, if it is new; one a visit."""
         offered = self._offered_cycle
         waits = offered is not None and cycle - offered <= self._config.refractory_cycles
         if waits or not self._map or not self._visits:
@@ -252,14 +252,14 @@ class EpisodicMemory:
 
 
 def _moved(pose: Floats, places_m: list[Position]) -> list[Position]:
-    """Places in the frame in which their own frame has that pose."""
+    """Move places into the frame in which their own frame has that pose."""
     rows = transform_from(pose, np.array(places_m)).tolist()
     return [(x_m, y_m) for x_m, y_m in rows]
 
 
 def _node(episode: KeptEpisode, match: float) -> nodes.Episode:
-    """What an episode on the root map is offered as: the better it matches, the more active it is,
-    and the more it is felt what was felt then.
+    """Make the node as which an episode on the root map is offered: the better it matches, the more
+    active it is, and the stronger the feeling of that time is felt again.
     """
     felt = max((node.salience for node in episode.content), key=abs, default=0.0)
     return nodes.Episode(

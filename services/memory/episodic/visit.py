@@ -44,11 +44,11 @@ class Visit:
 
     @property
     def has_content(self) -> bool:
-        """Whether anything was conscious here beside the agent itself."""
+        """Return whether anything but the agent itself was conscious here."""
         return bool(self._counts)
 
     def includes(self, at_m: Position) -> bool:
-        """Whether the agent at `at_m` is still at this place."""
+        """Decide whether the agent at `at_m` is still at this place."""
         return math.dist(at_m, self.at_m) <= PLACE_M
 
     def add(self, broadcast: Broadcast) -> None:
@@ -68,8 +68,8 @@ class Visit:
         self.activation = min(1.0, self.activation + amount)
 
     def episode(self, run: int, map_name: str) -> TransientEpisode:
-        """The episode so far: of its content the most salient nodes, and of equal ones those that
-        were broadcast most often.
+        """Make the episode so far. Its content is the most salient nodes, and of equal ones those
+        that were broadcast most often.
         """
 
         def order(name: Name) -> tuple[float, int, Name]:
@@ -98,7 +98,7 @@ class Visit:
 
 
 def name_of(node: AnyNode) -> Name | None:
-    """The kind of a node and what it is called in episodes; None of one that is in none, such as
+    """Return the kind of a node and its name in episodes; None for a node that is in none, such as
     the self, which is in all.
     """
     match node:

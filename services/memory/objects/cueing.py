@@ -43,8 +43,8 @@ class ObjectCues:
                 self._conscious.append((broadcast.cycle, node.id))
 
     def cued(self, cycle: int, forgotten: Sequence[Object]) -> list[Object]:
-        """The nodes as which forgotten objects come back, the nearest first; none while the map is
-        about to move.
+        """Return the nodes as which forgotten objects come back, the nearest first; none while the
+        map is about to move.
         """
         cues_m = self._places_m(cycle)
         is_moving = {CORRECTION_ID, RECOLLECTION_ID} & self._graph.nodes.keys()
@@ -68,7 +68,7 @@ class ObjectCues:
         ]
 
     def _places_m(self, cycle: int) -> list[Position]:
-        """Where the agent knows to be, and where what was broadcast before `cycle` stands."""
+        """List where the agent knows it is, and where what was broadcast before `cycle` stands."""
         places_m = []
         agent = self._graph.agent
         if agent is not None and agent.map == ROOT_MAP and not agent.misfits.is_lost:

@@ -59,7 +59,7 @@ class ForgottenObjects:
 
     @property
     def known(self) -> list[Object]:
-        """All of them, by label."""
+        """Return all of them, sorted by label."""
         return [self._forgotten[label] for label in sorted(self._forgotten)]
 
     def note(self, delta: Delta) -> None:
@@ -146,7 +146,7 @@ class ForgottenObjects:
             self._put(node)
 
     def _is_stored(self, node: Object) -> bool:
-        """Whether an object of the graph was seen often enough to be stored."""
+        """Decide whether an object of the graph was seen often enough to be stored."""
         return node.sightings >= MIN_SIGHTINGS
 
     def _put(self, node: Object) -> None:
@@ -186,7 +186,7 @@ class ForgottenObjects:
 
 
 def _objects_of(stored: StoredObjects) -> list[Object]:
-    """The objects of a record. How well each was known is not stored."""
+    """Return the objects of a record. How well each was known is not stored."""
     objects = []
     rows = np.asarray(stored.objects.numpy(), np.float64).tolist()
     for label, function, row in zip(stored.labels, stored.functions, rows, strict=True):

@@ -30,12 +30,12 @@ class BinaryMemory:
 
     @property
     def dimensions(self) -> int:
-        """1000."""
+        """Return 1000."""
         return DIMENSIONS
 
     @property
     def values(self) -> int:
-        """2."""
+        """Return 2."""
         return VALUES
 
     def write(self, address: Bytes, value: Bytes) -> None:
@@ -47,8 +47,8 @@ class BinaryMemory:
         self._counters[is_active] = np.clip(counted, -COUNTER_LIMIT, COUNTER_LIMIT)
 
     def read_once(self, cue: Bytes) -> Bytes | None:
-        """The sign of each bit's sum, and the cue's bit where that is zero; None if no location
-        within reach holds anything.
+        """Read the sign of each bit's sum, and the cue's bit where the sum is zero; None if no
+        location within reach holds anything.
         """
         held = self._counters[self._is_active(cue)]
         if not held.any():

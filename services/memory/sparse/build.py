@@ -9,7 +9,7 @@ from cogmap.services.memory.sparse.modular import ModularMemory
 
 
 def build(config: SparseConfig) -> AssociativeMemory:
-    """An empty memory of the kind that is configured."""
+    """Build an empty memory of the kind that is configured."""
     if config.kind == "binary":
         return BinaryMemory(config)
 

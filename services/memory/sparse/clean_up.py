@@ -22,7 +22,7 @@ class CleanUpMemory(Generic[Key]):
 
     @property
     def keys(self) -> set[Key]:
-        """The keys of all vectors."""
+        """Return the keys of all vectors."""
         return set(self._vectors)
 
     def put(self, key: Key, vector: Bytes) -> None:
@@ -34,13 +34,13 @@ class CleanUpMemory(Generic[Key]):
         del self._vectors[key]
 
     def get(self, key: Key) -> Bytes:
-        """The vector of a key. Raises KeyError if there is none."""
+        """Return the vector of a key. Raises KeyError if there is none."""
         return self._vectors[key]
 
     def nearest(
         self, vector: Bytes, is_wanted: Callable[[Key], bool] = lambda _: True
     ) -> Key | None:
-        """The key of the vector nearest to one, of those that are wanted; None if that is
+        """Find the key of the wanted vector that is nearest to `vector`; None if `vector` is
         related to none.
         """
         keys = [key for key in self._vectors if is_wanted(key)]

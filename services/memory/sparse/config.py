@@ -16,20 +16,21 @@ class SparseConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fie
         Literal["modular", "binary"],
         msgspec.Meta(
             description="modular: vectors of `dimensions` values, 0 to 15. binary: LIDA's "
-            "published memory, of vectors of 1000 bits. LIDA: binary; here modular, because of 50 "
-            "episodes binary memory recalls 40 %, and modular memory of 500 recalls 96 %."
+            "published memory, of vectors of 1000 bits. LIDA: binary; here modular, "
+            "because of 50 episodes binary memory recalls 40 %, and modular memory of "
+            "500 recalls 96 %."
         ),
     ] = "modular"
     hard_locations: Annotated[
         int,
-        msgspec.Meta(ge=1000, le=100_000, description="Hard locations"),
+        msgspec.Meta(ge=1000, le=100_000, description="Hard locations."),
     ] = 10_000
     dimensions: Annotated[
         int,
         msgspec.Meta(
             ge=64,
             le=8192,
-            description="Dimensions of a modular memory's vectors",
+            description="Dimensions of a modular memory's vectors.",
         ),
     ] = 1024
     seed: Annotated[
@@ -37,6 +38,6 @@ class SparseConfig(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fie
         msgspec.Meta(
             ge=0,
             le=2**62,
-            description="Seed of the addresses of the hard locations",
+            description="Seed of the addresses of the hard locations.",
         ),
     ] = 0

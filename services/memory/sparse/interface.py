@@ -32,12 +32,12 @@ class AssociativeMemory(Protocol):
 
     @property
     def dimensions(self) -> int:
-        """The length of addresses, values and cues."""
+        """Return the length of addresses, values and cues."""
         ...
 
     @property
     def values(self) -> int:
-        """The number of values that a dimension has."""
+        """Return the number of values that a dimension has."""
         ...
 
     def write(self, address: Bytes, value: Bytes) -> None:
@@ -45,7 +45,7 @@ class AssociativeMemory(Protocol):
         ...
 
     def read_once(self, cue: Bytes) -> Bytes | None:
-        """What is stored around `cue`; None if nothing is within its reach."""
+        """Read what is stored around `cue`; None if nothing is within its reach."""
         ...
 
     def read(self, cue: Bytes) -> Recall | None:

@@ -44,14 +44,14 @@ dimensions corrupted recall all, and with 0.01 89 %.
 
 
 def hard_addresses(config: SparseConfig) -> Bytes:
-    """(hard locations, dimensions): the addresses of a modular memory."""
+    """Draw the addresses of a modular memory, (hard locations, dimensions)."""
     rng = np.random.default_rng(config.seed)
     return random_vectors(rng, config.hard_locations, config.dimensions)
 
 
 def access_radius(config: SparseConfig) -> int:
-    """The distance within which lies ACTIVATED_SHARE of all vectors, by the normal distribution
-    that the sum over many dimensions follows.
+    """Compute the distance within which ACTIVATED_SHARE of all vectors lie, by the normal
+    distribution that the sum over many dimensions follows.
     """
     sds = NormalDist().inv_cdf(ACTIVATED_SHARE)
     spread = sd_distance(config.dimensions)
@@ -79,12 +79,12 @@ class ModularMemory:
 
     @property
     def dimensions(self) -> int:
-        """The length of addresses, values and cues."""
+        """Return the length of addresses, values and cues."""
         return self._dimensions
 
     @property
     def values(self) -> int:
-        """16."""
+        """Return 16."""
         return VALUES
 
     def write(self, address: Bytes, value: Bytes) -> None:
@@ -101,7 +101,7 @@ class ModularMemory:
         self._totals += np.subtract(after, before, dtype=np.int32).sum(axis=0)
 
     def read_once(self, cue: Bytes) -> Bytes | None:
-        """What is stored around `cue`; None if nothing is stored at all."""
+        """Read what is stored around `cue`; None if nothing is stored at all."""
         sums = self._sums(self._active(cue))
         if not sums.any():
             return None
@@ -122,7 +122,7 @@ class ModularMemory:
         return _Active(numbers, (depths / length).astype(np.float32))
 
     def _sums(self, active: _Active) -> Floats:
-        """(2, dimensions): what the active locations hold beyond the mean of all locations."""
+        """Sum what the active locations hold beyond the mean of all locations, (2, dimensions)."""
         held = self.counters[active.numbers]
         weighted = np.einsum("k,kcd->cd", active.weights, held)
         mean = self._totals / len(self.counters)

@@ -27,28 +27,28 @@ class ItemMemory:
         self._items: dict[str, Bytes] = {}
 
     def item(self, name: str) -> Bytes:
-        """The vector of an item."""
+        """Return the vector of an item."""
         if name not in self._items:
             self._items[name] = self._drawn("item", name)
         return self._items[name]
 
     def role(self, name: str) -> Bytes:
-        """The vector of a role, which is unrelated to that of an item of the same name."""
+        """Return the vector of a role, which is unrelated to that of an item of the same name."""
         return self._drawn("role", name)
 
     def filled(self, role: str, name: str) -> Bytes:
-        """The item of a name, bound to a role."""
+        """Return the item of a name, bound to a role."""
         return bind(self.role(role), self.item(name), self.values)
 
     def _drawn(self, kind: str, name: str) -> Bytes:
-        """Values from a hash: no version of a random generator changes what is stored."""
+        """Draw values from a hash: no version of a random generator changes what is stored."""
         key = f"{self._seed} {kind} {name}".encode()
         drawn = hashlib.shake_256(key).digest(self.dimensions)
         return np.frombuffer(drawn, np.uint8) & np.uint8(self.values - 1)
 
 
 def encode_sequence(items: ItemMemory, names: Sequence[str]) -> Bytes:
-    """The bundle of the items, each permuted by its place in the sequence.
+    """Bundle the items, each permuted by its place in the sequence.
 
     Raises ValueError if there are none.
     """

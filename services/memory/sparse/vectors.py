@@ -30,23 +30,23 @@ def random_vectors(
 
 
 def bind(one: Bytes, other: Bytes, values: int = VALUES) -> Bytes:
-    """The sum of two vectors around the circle, which is unrelated to both."""
+    """Sum two vectors around the circle; the result is unrelated to both."""
     # uint8 wraps at 256, a multiple of `values`.
     return (one + other) & np.uint8(values - 1)
 
 
 def unbind(bound: Bytes, one: Bytes, values: int = VALUES) -> Bytes:
-    """What was bound to `one`: the inverse of `bind`."""
+    """Return what was bound to `one`: the inverse of `bind`."""
     return (bound - one) & np.uint8(values - 1)
 
 
 def permuted(vector: Bytes, steps: int) -> Bytes:
-    """The dimensions rotated by some steps. The negative of `steps` undoes it."""
+    """Rotate the dimensions by some steps. The negative of `steps` undoes it."""
     return np.roll(vector, steps)
 
 
 def bundle(vectors: Bytes, values: int = VALUES) -> Bytes:
-    """A vector that is near to each of (n, dimensions): the sums of their unit vectors, as phases.
+    """Make a vector near to each of (n, dimensions): the sums of their unit vectors, as phases.
 
     A sum half-way between two phases becomes the later one, and a dimension in which the unit
     vectors cancel out has the first vector's value.
@@ -56,15 +56,15 @@ def bundle(vectors: Bytes, values: int = VALUES) -> Bytes:
 
 
 def unit_vectors(vectors: Bytes, values: int = VALUES) -> Floats:
-    """(2, ...): the cosines and the sines of each phase."""
+    """Return the cosines and the sines of each phase, (2, ...)."""
     angles_rad = np.arange(values) * (math.tau / values)
     table = np.stack([np.cos(angles_rad), np.sin(angles_rad)])
     return table[:, vectors]
 
 
 def nearest_phases(sums: Floats, otherwise: Bytes, values: int = VALUES) -> Bytes:
-    """The phase nearest to the direction of each column of `sums` (2, dimensions), and that of
-    `otherwise` where a column has no direction.
+    """Find the phase nearest to the direction of each column of `sums` (2, dimensions), and take
+    that of `otherwise` where a column has no direction.
     """
     cosines, sines = sums
     phases = np.arctan2(sines, cosines) * (values / math.tau)
@@ -75,12 +75,12 @@ def nearest_phases(sums: Floats, otherwise: Bytes, values: int = VALUES) -> Byte
 
 
 def distance(one: Bytes, other: Bytes, values: int = VALUES) -> int:
-    """The sum over the dimensions of how far apart the values are, the shorter way around."""
+    """Sum over the dimensions how far apart the values are, the shorter way around."""
     return int(distances(one, other, values))
 
 
 def distances(rows: Bytes, vector: Bytes, values: int = VALUES) -> Indices:
-    """(n,): the distance of each of (n, dimensions) from one vector."""
+    """Compute the distance of each of (n, dimensions) from one vector, (n,)."""
     forwards = unbind(rows, vector, values)
     backwards = unbind(vector, rows, values)
     sums: Indices = np.minimum(forwards, backwards).sum(axis=-1, dtype=np.int64)
@@ -88,26 +88,26 @@ def distances(rows: Bytes, vector: Bytes, values: int = VALUES) -> Indices:
 
 
 def mean_distance(dimensions: int, values: int = VALUES) -> float:
-    """That of unrelated vectors: 4096 for 1,024 dimensions of 16 values."""
+    """Compute the mean distance of unrelated vectors: 4096 for 1,024 dimensions of 16 values."""
     return dimensions * values / 4
 
 
 def sd_distance(dimensions: int, values: int = VALUES) -> float:
-    """The standard deviation of the distances of unrelated vectors: 75 for 1,024 dimensions of 16
-    values.
+    """Compute the standard deviation of the distances of unrelated vectors: 75 for 1,024 dimensions
+    of 16 values.
     """
     variance = (values**2 + 8) / 48
     return math.sqrt(dimensions * variance)
 
 
 def contained_below(dimensions: int, values: int = VALUES) -> float:
-    """The distance below which two vectors are related: CONTAINED_SDS standard deviations below the
-    mean, which one pair of unrelated vectors in three million is.
+    """Compute the distance below which two vectors are related: CONTAINED_SDS standard deviations
+    below the mean. One pair of unrelated vectors in three million is that near.
     """
     spread = sd_distance(dimensions, values)
     return mean_distance(dimensions, values) - CONTAINED_SDS * spread
 
 
 def contains(one: Bytes, other: Bytes, values: int = VALUES) -> bool:
-    """Whether a bundle contains a vector: whether the two are related, either way round."""
+    """Decide whether a bundle contains a vector: whether the two are related, either way round."""
     return distance(one, other, values) < contained_below(len(one), values)

@@ -25,7 +25,7 @@ class Escape:
         self._until_ns = -1
 
     def command(self, wanted: MotorCommand, is_stuck: bool) -> MotorCommand:
-        """The command instead of the one that is wanted."""
+        """Replace the wanted command while the robot is to back away; else return it."""
         now_ns = wanted.stamp_ns
         if wanted.halted_by is not SpeedLimit.OBSTACLE:
             self._halted_since_ns = None

@@ -97,8 +97,8 @@ class NearObstacles:
         self._is_sure = np.concatenate([self._is_sure, np.full(number, is_sure)])
 
     def _sudden_m(self, bearing_rad: Floats, range_m: Floats) -> Floats:
-        """(n, 2): where that may be which two neighbouring rays hit too near for a range, and which
-        was not seen from farther away before.
+        """Find where something may be, (n, 2), that two neighbouring rays hit too near for a range,
+        and that was not seen from farther away before.
         """
         order = np.argsort(bearing_rad)
         ascending_rad = bearing_rad[order]
@@ -115,8 +115,8 @@ class NearObstacles:
         return _points_m(each_rad, np.tile(TOO_NEAR_M, len(new_rad)))
 
     def clear_curvature(self, wanted_per_m: float) -> float | None:
-        """The curvature nearest to the one that is wanted whose arc leads past all that is near;
-        None if none does.
+        """Find the curvature nearest to the one that is wanted whose arc leads past all that is
+        near; None if none does.
         """
         # Near enough to matter, and seen in MIN_SCANS scans or suddenly.
         is_near = np.hypot(*self._points_m.T) <= ARC_M + self._clearance_m + SAME_M
@@ -139,9 +139,9 @@ class NearObstacles:
         return float(per_m[change_per_m.argmin()])
 
     def _is_seen_through(self, bearing_rad: Floats, range_m: Floats) -> Booleans:
-        """(n,): which remembered points lie before what a scan sees in their direction and to both
-        sides of it: the edge of something is a little aside of where it was, by what odometry and
-        the width of a ray amount to.
+        """Decide which remembered points, (n,), lie before what a scan sees in their direction and
+        to both sides of it: the edge of something is a little aside of where it was, by the error
+        of odometry and the width of a ray.
         """
         x_m, y_m = self._points_m.T
         if len(bearing_rad) < 2:
@@ -173,8 +173,8 @@ class NearObstacles:
 
 
 def _scans_near(points_m: Floats, hits_m: Floats, stamps_ns: Indices) -> Indices:
-    """(n,): how many scans have one of (k, 2) hits, by their (k,) stamps, within SAME_M of each of
-    (n, 2) points.
+    """Count the scans, (n,), that have one of (k, 2) hits, by their (k,) stamps, within SAME_M of
+    each of (n, 2) points.
     """
     away_m = np.hypot(*(points_m[:, None] - hits_m).transpose(2, 0, 1))
     is_same = away_m <= SAME_M
@@ -186,7 +186,7 @@ def _scans_near(points_m: Floats, hits_m: Floats, stamps_ns: Indices) -> Indices
 
 
 def _hits_m(bearing_rad: Floats, range_m: Floats) -> Floats:
-    """(n, 2): what a scan hits, and where the surfaces that it hits end at the farthest."""
+    """Find what a scan hits, and the farthest ends of the surfaces that it hits, (n, 2)."""
     order = np.argsort(bearing_rad)
     ascending_rad = bearing_rad[order]
     seen_m = range_m[order]
@@ -203,8 +203,8 @@ def _hits_m(bearing_rad: Floats, range_m: Floats) -> Floats:
 
 
 def _ends_m(bearing_rad: Floats, range_m: Floats) -> Floats:
-    """(n, 2): where a surface meets the first ray that passes it on the left, SAME_M from its last
-    hit at the farthest.
+    """Find where a surface meets the first ray that passes it on the left, at most SAME_M from its
+    last hit, (n, 2).
 
     Rays of (k,) ascending bearings sample a surface: it ends somewhere between two of them, which
     is far along it at a small angle of incidence. What leaves the view continues as well.
@@ -235,7 +235,7 @@ def _points_m(bearing_rad: Floats, range_m: Floats) -> Floats:
 
 
 def _least_distances_m(per_m: Floats, points_m: Floats) -> Floats:
-    """(k,): how near arcs of (k,) curvatures lead past (n, 2) points."""
+    """Compute how near arcs of (k,) curvatures lead past (n, 2) points, (k,)."""
     along_m = np.arange(STEP_M, ARC_M + STEP_M / 2, STEP_M)
     turned_rad = per_m[:, None] * along_m
     is_straight = np.abs(per_m) < 1e-6

@@ -24,8 +24,8 @@ class StuckDetector:
         self.is_stuck = False
 
     def on_command(self, speed_m_s: float) -> None:
-        """The robot was commanded to move at `speed_m_s`; the motions that follow are compared with
-        it.
+        """Note that the robot was commanded to move at `speed_m_s`; the motions that follow are
+        compared with it.
         """
         self._commanded_m_s = speed_m_s
 

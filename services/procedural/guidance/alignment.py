@@ -29,16 +29,16 @@ class Motion(NamedTuple):
 
     @property
     def turn_rad(self) -> float:
-        """The angle of the rotation, left positive."""
+        """Return the angle of the rotation, left positive."""
         return cmath.phase(self.rotation)
 
     def moved(self, point_m: complex) -> complex:
-        """Where the motion brings a point."""
+        """Return where the motion brings a point."""
         return self.rotation * point_m + self.shift_m
 
     def origin_before(self) -> complex:
-        """The point that the motion brings to the origin: where the robot is now, as seen from
-        where it was.
+        """Return the point that the motion brings to the origin: where the robot is now, as seen
+        from where it was.
         """
         return -self.shift_m * self.rotation.conjugate()
 
@@ -53,18 +53,18 @@ class Pair(NamedTuple):
 
     @property
     def sd_m(self) -> float:
-        """The standard deviation of the difference, the greater the farther it is."""
+        """Return the standard deviation of the difference: the farther away, the greater."""
         return NEAR_SD_M + RANGE_SD_SHARE * abs(self.now_m)
 
 
 def position_m(relation: Relation) -> complex:
-    """Where an object stands."""
+    """Return where an object stands."""
     return cmath.rect(relation.range_m, relation.bearing_rad)
 
 
 def pairs_of(then: Sequence[Relation], now: Sequence[Relation]) -> list[Pair]:
-    """Each landmark with the nearest object of its look that no other has; without those that have
-    none.
+    """Pair each landmark with the nearest object of its look that no other has; leave out those
+    that have none.
     """
     distances = []
     for i, before in enumerate(then):
@@ -83,8 +83,8 @@ def pairs_of(then: Sequence[Relation], now: Sequence[Relation]) -> list[Pair]:
 
 
 def aligned(pairs: Sequence[Pair]) -> tuple[Motion, list[Pair]] | None:
-    """The motion that brings landmarks from where they stood to where they stand, and those that
-    agree with it; None if fewer than two agree of several. One alone moves them without turning.
+    """Find the motion that brings landmarks from where they stood to where they stand, and those
+    that agree with it; None if fewer than two of several agree. One alone moves without turning.
     """
     left = list(pairs)
     while left:
@@ -104,7 +104,7 @@ def _misfit(pair: Pair, motion: Motion) -> float:
 
 
 def _least_squares(pairs: Sequence[Pair]) -> Motion:
-    """The best weighted rotation and shift, with a prior for a small rotation."""
+    """Fit the best weighted rotation and shift, with a prior for a small rotation."""
     then_m = np.array([(pair.then_m.real, pair.then_m.imag) for pair in pairs])
     now_m = np.array([(pair.now_m.real, pair.now_m.imag) for pair in pairs])
     weights = np.array([pair.sd_m**-2 for pair in pairs])

@@ -26,11 +26,11 @@ class Arrivals:
         self._awaited: dict[str, Arrival] = {}
 
     def expect(self, scheme: str, place_m: complex, stamp_ns: int) -> None:
-        """A scheme is executed."""
+        """Await the agent at the place to which an executed scheme leads."""
         self._awaited[scheme] = Arrival(place_m, stamp_ns + WITHIN_NS)
 
     def judged(self, at_m: complex, stamp_ns: int) -> dict[str, bool]:
-        """Which schemes are judged where the agent is at a time, and whether with success."""
+        """Judge schemes by where the agent is at a time; return which, and whether with success."""
         judged = {}
         for scheme, arrival in self._awaited.items():
             is_there = abs(arrival.place_m - at_m) <= THERE_M

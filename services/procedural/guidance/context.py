@@ -20,7 +20,7 @@ RESULT = "self at the end of the path"
 
 
 def reliability(scheme: GuidanceScheme) -> float:
-    """The share of its executions that were successes, UNTRIED before the first."""
+    """Compute the share of its executions that were successes, UNTRIED before the first."""
     if not scheme.executions:
         return UNTRIED
     return scheme.successes / scheme.executions
@@ -38,11 +38,11 @@ class Fit(NamedTuple):
 
     @property
     def rank(self) -> tuple[float, float, str]:
-        """The order in which schemes come to mind."""
+        """Return the key that orders schemes as they come to mind."""
         return -self.activation, -reliability(self.scheme), self.scheme.name
 
     def behaviour(self, seen_ns: int) -> Behaviour:
-        """What the scheme becomes by a view of that stamp."""
+        """Make the behaviour that the scheme becomes by a view of that stamp."""
         scheme = self.scheme
         parameters: dict[str, Scalar] = {SEEN_NS: seen_ns}
         for number, path_m in enumerate(scheme.path_m, start=1):
@@ -66,10 +66,10 @@ class Fit(NamedTuple):
 def fit(
     scheme: GuidanceScheme, relations: Mapping[str, Relation], activations: Mapping[str, float]
 ) -> Fit | None:
-    """How a scheme fits the `relations` to objects, by their ids; None if it does not.
+    """Fit a scheme to the `relations` to objects, by their ids; None if it does not fit.
 
-    Each landmark is as active as its object, the less the farther the agent is from where it
-    learned the scheme: half as much at HALF_AWAY_M, or HALF_TURNED_RAD. One that is missing is not
+    Each landmark is as active as its object, but the less the farther the agent is from where it
+    learned the scheme: half as much at HALF_AWAY_M, or HALF_TURNED_RAD. A missing landmark is not
     active, and fewer than MIN_LANDMARKS count as that many, the others missing.
     """
     pairs = pairs_of(scheme.landmarks, list(relations.values()))
@@ -92,7 +92,7 @@ def fit(
 
 
 def end_of(parameters: Mapping[str, Scalar]) -> complex | None:
-    """The last place of the path that parameters have; None if they have no path."""
+    """Return the last place of the path that parameters have; None if they have no path."""
     last = len(parameters) // 2
     ahead_m = parameters.get(f"ahead_{last}_m")
     left_m = parameters.get(f"left_{last}_m")
@@ -102,6 +102,6 @@ def end_of(parameters: Mapping[str, Scalar]) -> complex | None:
 
 
 def _spelled(landmark: Relation) -> str:
-    """A landmark in words."""
+    """Spell a landmark in words."""
     degrees = math.degrees(landmark.bearing_rad)
     return f"{landmark.look} at {landmark.range_m:.0f} m, {degrees:+.0f} degrees"

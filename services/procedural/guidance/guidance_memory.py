@@ -46,7 +46,7 @@ class GuidanceMemory:
 
     @property
     def kept(self) -> list[GuidanceScheme]:
-        """All that were learned or judged."""
+        """Return all schemes that were learned or judged."""
         return list(self._kept.values())
 
     def restore(self, schemes: Iterable[GuidanceScheme]) -> None:
@@ -56,7 +56,7 @@ class GuidanceMemory:
         self._next_number = max(self._next_number, number_after(self.kept))
 
     def on_action(self, action: Action) -> None:
-        """An action is executed, or the one before continues."""
+        """Note that an action is executed, or that the one before continues."""
         if not action.scheme:
             return
 
@@ -72,7 +72,7 @@ class GuidanceMemory:
             self._arrivals.expect(action.scheme, place.out(end_m), action.stamp_ns)
 
     def on_broadcast(self, broadcast: Broadcast) -> list[GuidanceScheme]:
-        """The schemes that a broadcast completes, or lets be judged."""
+        """Return the schemes that a broadcast completes, or lets be judged."""
         agent = _agent_of(broadcast)
         if agent is None:
             return []
@@ -107,8 +107,8 @@ class GuidanceMemory:
         return changed
 
     def behaviours(self, broadcast: Broadcast, nodes: Sequence[Active]) -> list[Behaviour]:
-        """That of the scheme that fits best, if that is at least MIN_FIT; none if the agent has a
-        goal.
+        """Return the behaviour of the scheme that fits best, if that is at least MIN_FIT; none if
+        the agent has a goal.
         """
         agent = _agent_of(broadcast)
         relations = broadcast.coalition.relations
@@ -135,7 +135,7 @@ class GuidanceMemory:
 
 
 def number_after(schemes: Iterable[GuidanceScheme]) -> int:
-    """The first number from 1 that no scheme has in its name, nor one before it."""
+    """Return the number after the highest that a scheme has in its name; 1 if none has any."""
     numbers = [0]
     for scheme in schemes:
         match = _NUMBERED.fullmatch(scheme.name)

@@ -31,16 +31,16 @@ class Place(NamedTuple):
 
     @staticmethod
     def of(agent: Self) -> Place:
-        """That of a self node."""
+        """Return the place of a self node."""
         at_m = complex(agent.odometry.x_m, agent.odometry.y_m)
         return Place(at_m, agent.odometry.heading_rad)
 
     def to(self, other_m: complex) -> complex:
-        """Another position, metres ahead + metres left x i as seen from here."""
+        """Return another position as seen from here, metres ahead + metres left x i."""
         return (other_m - self.at_m) * cmath.rect(1.0, -self.heading_rad)
 
     def out(self, seen_m: complex) -> complex:
-        """The position of what is seen there."""
+        """Return the position of what is seen at `seen_m` from here."""
         return self.at_m + seen_m * cmath.rect(1.0, self.heading_rad)
 
 
@@ -63,7 +63,7 @@ class Begun:
     path_m: list[complex]
 
     def ended(self, place: Place) -> Lesson:
-        """The lesson that ends at a place."""
+        """Make the lesson that ends at a place."""
         return Lesson(self.landmarks, [*self.path_m, self.place.to(place.at_m)])
 
 
@@ -86,8 +86,8 @@ class Lessons:
         self._stopped_ns: int | None = None
 
     def on_view(self, agent: Self, relations: Iterable[Relation], drives: bool) -> list[Lesson]:
-        """The lessons that end with what is conscious; `drives`: whether the agent does something
-        of its own to get anywhere. None of a view that became conscious after a later one.
+        """Return the lessons that end with what is conscious; none if the view became conscious
+        after a later one. `drives`: whether the agent does something of its own to get anywhere.
         """
         if agent.stamp_ns <= self._seen_ns:
             return []

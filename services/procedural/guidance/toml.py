@@ -9,7 +9,7 @@ from cogmap.schemas.cognition import GuidanceScheme
 
 
 def written(schemes: Iterable[GuidanceScheme]) -> str:
-    """The text, to a millimetre and a tenth of a milliradian."""
+    """Write the text, to a millimetre and a tenth of a milliradian."""
     return "\n".join(_table(scheme) for scheme in schemes)
 
 

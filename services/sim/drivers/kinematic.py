@@ -89,7 +89,7 @@ class KinematicRobot:
         return [self._odometry.measure(before, self.pose, dt_s)]
 
     def _is_in_the_way(self, x_m: float, y_m: float) -> bool:
-        """Return if something would be within the body there, and the more so than now."""
+        """Decide whether something would be within the body there, and more so than now."""
         there_m = self._clearance_m(x_m, y_m)
         if there_m >= BODY_RADIUS_M:
             return False

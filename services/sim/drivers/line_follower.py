@@ -35,19 +35,19 @@ class LineFollower:
 
     @property
     def pose(self) -> Pose:
-        """The pose on the line, heading as it does."""
+        """Return the pose on the line, heading as it does."""
         return self.line.at(self.travelled_m)
 
     @property
     def course_share(self) -> float:
-        """How much of the line is travelled, 0 to 1."""
+        """Return the share of the line that is travelled, 0 to 1."""
         return self.travelled_m / self.line.length_m
 
     def drive(self, command: MotorCommand) -> None:
         """Ignore the command."""
 
     def brake(self) -> None:
-        """Ignore it too."""
+        """Ignore the order to stop."""
 
     def resume(self, last: TruePose) -> None:
         """Continue where a robot was that had travelled as far."""

@@ -13,7 +13,7 @@ HEIGHT_M = 1.2
 
 
 def barriers(roads: Sequence[Road]) -> dict[str, Prop]:
-    """What would close each street, by its name: of several roads of one name, the longest."""
+    """Make a barrier for each street, by its name: of several roads of one name, the longest."""
     longest: dict[str, Road] = {}
     for road in roads:
         other = longest.setdefault(road.name, road)

@@ -30,8 +30,8 @@ class Surfaces(NamedTuple):
     half_width_m: Floats
 
     def local(self, points_m: Floats) -> tuple[Floats, Floats]:
-        """(k, n) each: how far (k, 2) points are from each middle, along the street and to its
-        left.
+        """Return how far (k, 2) points are from each middle, along the street and to its left,
+        (k, n) each.
         """
         ahead_x, ahead_y = self.ahead.T
         middle_x_m, middle_y_m = self.middle_m.T
@@ -43,12 +43,12 @@ class Surfaces(NamedTuple):
         return along_m, left_m
 
     def chosen(self, numbers: Booleans) -> Surfaces:
-        """Those of a mask, (n,)."""
+        """Select the surfaces of a mask, (n,)."""
         return Surfaces(*(column[numbers] for column in self))
 
 
 def surfaces(roads: Sequence[Road]) -> Surfaces:
-    """The surfaces of `roads`."""
+    """Return the surfaces of `roads`."""
     middles = [road.middle for road in roads]
     headings_rad = np.array([road.heading_rad for road in roads])
     lengths_m = np.array([road.length_m for road in roads])
@@ -63,7 +63,7 @@ def surfaces(roads: Sequence[Road]) -> Surfaces:
 
 
 def outlines(shapes: Sequence[Sequence[Point]]) -> Floats:
-    """(n, 4): the sides of polygons, in order."""
+    """Return the (n, 4) sides of polygons, in order."""
     sides = []
     for shape in shapes:
         following = [*shape[1:], shape[0]]
@@ -94,7 +94,7 @@ def points_along(segments_m: Floats, step_m: float) -> Floats:
 
 
 def clearance_m(segments_m: Floats, x_m: float, y_m: float) -> float:
-    """The distance from a point to the nearest of (n, 4) segments, infinite where there is none."""
+    """Measure how far a point is from the nearest of (n, 4) segments, infinite if there is none."""
     if not len(segments_m):
         return math.inf
 
@@ -112,8 +112,8 @@ def clearance_m(segments_m: Floats, x_m: float, y_m: float) -> float:
 
 
 def kerbs(roads: Sequence[Road]) -> Floats:
-    """(n, 4): the outline of all that is the surface of a street: the sides of each street without
-    what lies on another.
+    """Find the (n, 4) outline of all that is the surface of a street: the sides of each street
+    without what lies on another.
     """
     if not roads:
         return np.zeros((0, 4))
@@ -136,7 +136,7 @@ def _surface(road: Road) -> tuple[Point, ...]:
 
 
 def _uncovered(sides: Floats, owners: Indices, streets: Surfaces) -> list[list[float]]:
-    """The parts of (k, 4) sides, each of the street `owners`, that lie on no other street.
+    """Find the parts of (k, 4) sides, each of the street `owners`, that lie on no other street.
 
     Of two sides at the same place, the first street's is kept.
     """
@@ -158,7 +158,7 @@ def _uncovered(sides: Floats, owners: Indices, streets: Surfaces) -> list[list[f
 
 
 def _covered(sides: Floats, owners: Indices, streets: Surfaces) -> tuple[Floats, Floats]:
-    """(k, n) each: from which to which share of its length each side lies on each street."""
+    """Find from which to which share of its length each side lies on each street, (k, n) each."""
     numbers = np.arange(len(streets.half_width_m))
     owner = owners[:, None]
     wider_m = np.where(numbers < owner, _SAME_M, -_SAME_M)
@@ -177,8 +177,8 @@ def _covered(sides: Floats, owners: Indices, streets: Surfaces) -> tuple[Floats,
 
 
 def _crossing(start_m: Floats, end_m: Floats, half_m: Floats) -> tuple[Floats, Floats]:
-    """From which to which share of the way from `start_m` to `end_m` the distance is `half_m` at
-    most, to either side; the second is lower where it never is.
+    """Find from which to which share of the way from `start_m` to `end_m` the distance is `half_m`
+    at most, to either side; the second share is lower if it never is.
     """
     change_m = end_m - start_m
     is_level = np.abs(change_m) < _LEVEL_M
@@ -196,7 +196,7 @@ def _crossing(start_m: Floats, end_m: Floats, half_m: Floats) -> tuple[Floats, F
 
 
 def _gaps(starts: Floats, stops: Floats, shortest: float) -> list[tuple[float, float]]:
-    """The stretches of 0 to 1, longer than `shortest`, that none of the intervals covers."""
+    """Find the stretches of 0 to 1, longer than `shortest`, that none of the intervals covers."""
     gaps = []
     reached = 0.0
     for number in np.argsort(starts).tolist():

@@ -47,8 +47,8 @@ def _type(
     *,
     shape: str = "flat",
 ) -> BuildingType:
-    """`size_m`: width, depth, height; `colours`: of wall, accent and door; `finish`: colours of
-    trim and roof.
+    """Make a type; `size_m`: width, depth, height; `colours`: of wall, accent and door; `finish`:
+    colours of trim and roof.
     """
     width_m, depth_m, height_m = size_m
     wall, accent, door = colours.split()
@@ -187,8 +187,8 @@ _ROOFS = (_TILE, _SLATE, _COPPER, _THATCH, _DARK)
 
 
 def invented(seed: int, count: int) -> tuple[BuildingType, ...]:
-    """`count` kinds that are in no catalogue, named after `seed`: buildings that no network was
-    trained on.
+    """Invent `count` kinds that are in no catalogue, named after `seed`: buildings that no network
+    was trained on.
     """
     rng = np.random.default_rng([seed, 0x1D])
 
@@ -231,7 +231,7 @@ def _invent(name: str, rng: np.random.Generator) -> BuildingType:
 
 
 def _paint(rng: np.random.Generator) -> Colour:
-    """A colour that a house may have: of any hue, from white over strong to dark."""
+    """Draw a colour that a house may have: of any hue, from white over strong to dark."""
     pale = rng.uniform(0.0, 0.2)
     strong = rng.uniform(0.3, 0.95)
     saturation = float(rng.choice([pale, strong], p=[0.25, 0.75]))

@@ -37,10 +37,10 @@ _HALF_M = SIZE_M[1] / 2
 
 
 def with_charging_places(place: Place, seed: int, count: int) -> Place:
-    """`place` with `count` charging places more, the same from the same seed.
+    """Add `count` charging places to `place`, the same from the same seed.
 
     One is where the robot starts, if there is room. The others are spread so that none of its
-    streets is far from one, and clear of every street, building and prop. Raises ConfigError where
+    streets is far from one, and clear of every street, building and prop. Raises ConfigError if
     there is no room for so many.
     """
     if not count:
@@ -67,7 +67,7 @@ def with_charging_places(place: Place, seed: int, count: int) -> Place:
 
 
 def _candidates(rng: np.random.Generator, roads: Sequence[Road]) -> list[Prop]:
-    """Posts at the kerbs of long enough streets, wherever they would stand."""
+    """Draw posts at the kerbs of long enough streets, wherever they would stand."""
     lengths_m = np.array([max(0.0, road.length_m - 2 * JUNCTION_M) for road in roads])
     total_m = lengths_m.sum()
     if not total_m:
@@ -83,8 +83,8 @@ def _candidates(rng: np.random.Generator, roads: Sequence[Road]) -> list[Prop]:
 
 
 def _beside_start(place: Place) -> list[Prop]:
-    """Posts at the kerbs of the streets that the robot starts on, from which it is charged there,
-    the nearest first.
+    """Return posts at the kerbs of the streets that the robot starts on, so near that they charge
+    it there, the nearest first.
     """
     posts = []
     start = np.array([[place.start.x_m, place.start.y_m]])
@@ -117,7 +117,7 @@ def _post(road: Road, along_m: float, side: float) -> Prop:
 
 
 def _free(posts: Sequence[Prop], place: Place) -> list[Prop]:
-    """Those that stand on no street, in no building, and beside nothing else."""
+    """Keep the posts that stand on no street, in no building, and beside nothing else."""
     middles_m = _middles_m(posts)
     streets = surfaces(place.roads)
     along_m, left_m = streets.local(middles_m)
@@ -145,13 +145,13 @@ def _free(posts: Sequence[Prop], place: Place) -> list[Prop]:
 
 
 def _middles_m(posts: Sequence[Prop]) -> Floats:
-    """(n, 2)"""
+    """Return the (n, 2) middles of posts."""
     middles = [(post.x_m, post.y_m) for post in posts]
     return np.array(middles, float).reshape(-1, 2)
 
 
 def _is_apart(points_m: Floats, others: Sequence[Point], apart_m: float) -> Booleans:
-    """(n,): which of (n, 2) points are at least `apart_m` from all others."""
+    """Mark, (n,), those of (n, 2) points that are at least `apart_m` from all others."""
     others_m = np.array(others, float).reshape(-1, 2)
     return np.asarray((_distances_m(points_m, others_m) >= apart_m).all(axis=1))
 
@@ -159,8 +159,8 @@ def _is_apart(points_m: Floats, others: Sequence[Point], apart_m: float) -> Bool
 def _spread(
     rng: np.random.Generator, free_m: Floats, everywhere_m: Floats, count: int
 ) -> list[int]:
-    """Of DRAWS choices of `count` free places, (n, 2), the one from which the farthest place of all
-    is nearest; none where none has room for so many.
+    """Choose `count` of the (n, 2) free places: of DRAWS choices, the one from which the farthest
+    place of all is nearest. Returns none if no choice has room for so many.
     """
     away_m = _distances_m(free_m, everywhere_m)
     is_apart = _distances_m(free_m, free_m) >= POST_M
@@ -188,7 +188,7 @@ def _spread(
 
 
 def _distances_m(points_m: Floats, others_m: Floats) -> Floats:
-    """(n, k): the distance of each of (n, 2) points from each of (k, 2) others."""
+    """Return the (n, k) distances of each of (n, 2) points from each of (k, 2) others."""
     x_m, y_m = (points_m[:, None] - others_m[None]).transpose(2, 0, 1)
     distances_m: Floats = np.hypot(x_m, y_m)
     return distances_m

@@ -18,14 +18,14 @@ Seconds = Annotated[float, msgspec.Meta(ge=0, le=1e9)]
 class Closure(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """A street that a barrier closes for some time."""
 
-    street: Annotated[Name, msgspec.Meta(description="Name of the street, 1 to 200 characters.")]
+    street: Annotated[Name, msgspec.Meta(description="Name of the street.")]
     from_s: Annotated[
         Seconds,
-        msgspec.Meta(description="Simulated time at which it is closed, in s, 0 to 1e9."),
+        msgspec.Meta(description="Simulated time at which it is closed, in s."),
     ]
     to_s: Annotated[
         Seconds,
-        msgspec.Meta(description="Simulated time at which it is opened again, in s, 0 to 1e9."),
+        msgspec.Meta(description="Simulated time at which it is opened again, in s."),
     ] = 1e9
 
 
@@ -46,12 +46,12 @@ class ClosedStreets:
 
     @property
     def names(self) -> frozenset[str]:
-        """The streets that are closed now."""
+        """Return the streets that are closed now."""
         return frozenset(self._closed)
 
     def advance(self, now_ns: int) -> bool:
-        """Follow the schedule up to a time; whether a street was closed or opened since the last
-        call.
+        """Follow the schedule up to a time; return whether a street was closed or opened since the
+        last call.
         """
         while self._changes and self._changes[0][0] * 1e9 <= now_ns:
             _, street, is_closed = self._changes.pop(0)
@@ -62,7 +62,7 @@ class ClosedStreets:
         return is_changed
 
     def on_closure(self, closure: StreetClosure) -> None:
-        """Close or open a street now, whatever the schedule did before. Raises MessageError where
+        """Close or open a street now, whatever the schedule did before. Raises MessageError if
         there is none of that name.
         """
         if closure.street not in self._names:
@@ -83,8 +83,8 @@ class ClosedStreets:
 
 
 def _changes(schedule: Iterable[Closure]) -> list[tuple[float, str, bool]]:
-    """Time in s, street, and whether it is closed then, in order; at one time streets are opened
-    first.
+    """Return time in s, street, and whether it is closed then, in order; at one time streets are
+    opened first.
     """
     changes = []
     for closure in schedule:

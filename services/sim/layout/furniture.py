@@ -43,7 +43,7 @@ class Prop:
 
     @property
     def area(self) -> Rectangle:
-        """West, south, east, north of its bounding box."""
+        """Return west, south, east, north of its bounding box."""
         length_m, width_m, _ = self.size_m
         half_length_m = length_m / 2
         half_width_m = width_m / 2
@@ -62,8 +62,8 @@ class Prop:
 
     @property
     def solid_size_m(self) -> Size:
-        """The length, width and height of what stands in the way of a robot: of a tree or a lamp
-        its trunk.
+        """Return the length, width and height of what stands in the way of a robot: of a tree or a
+        lamp its trunk.
         """
         length_m, width_m, height_m = self.size_m
         trunk_m = _TRUNKS_M.get(self.kind)
@@ -74,7 +74,7 @@ class Prop:
 
     @property
     def seen(self) -> tuple[Point, ...]:
-        """The corners of what a range scan meets, counter-clockwise: of a tree its crown."""
+        """Return the corners of what a range scan meets, counter-clockwise: of a tree its crown."""
         length_m, width_m, _ = self.size_m
         share = _CROWN_SHARE if self.kind == "tree" else 1.0
         size_m = (share * length_m, share * width_m)
@@ -82,7 +82,7 @@ class Prop:
 
     @property
     def solid(self) -> tuple[Point, ...]:
-        """The corners of what stands in the way of a robot, counter-clockwise."""
+        """Return the corners of what stands in the way of a robot, counter-clockwise."""
         length_m, width_m, _ = self.solid_size_m
         return corners((self.x_m, self.y_m), self.heading_rad, (length_m, width_m))
 
@@ -102,7 +102,7 @@ _PROBABILITIES = (0.38, 0.14, 0.18, 0.14, 0.08, 0.08)
 
 
 def furnish(seed: int, roads: Sequence[Road], plots: Sequence[Plot]) -> tuple[Prop, ...]:
-    """Props along `roads` and some farther away, clear of every street and every building."""
+    """Draw props along `roads` and some farther away, clear of every street and every building."""
     rng = np.random.default_rng([seed, 0xF0])
     candidates = _along(rng, roads, _SPACING_M)
     for _ in range(_SCATTERED):
@@ -116,7 +116,7 @@ def furnish(seed: int, roads: Sequence[Road], plots: Sequence[Plot]) -> tuple[Pr
 def line_pavements(
     rng: np.random.Generator, roads: Sequence[Road], plots: Sequence[Plot], spacing_m: float
 ) -> tuple[Prop, ...]:
-    """Props along `roads`, clear of every street and every building."""
+    """Draw props along `roads`, clear of every street and every building."""
     candidates = _along(rng, roads, spacing_m)
     return _clear(candidates, roads, plots)
 
@@ -124,7 +124,7 @@ def line_pavements(
 def _clear(
     candidates: Sequence[Prop], roads: Sequence[Road], plots: Sequence[Plot]
 ) -> tuple[Prop, ...]:
-    """The candidates that stand on no street, in no building and in no candidate before them."""
+    """Keep the candidates that stand on no street, in no building and in none kept before them."""
     occupied = [road.kerbs for road in roads]
     occupied += [plot.footprint for plot in plots]
 
@@ -140,7 +140,7 @@ def _clear(
 
 
 def _along(rng: np.random.Generator, roads: Sequence[Road], spacing_m: float) -> list[Prop]:
-    """Candidates on both pavements of each road."""
+    """Draw candidates on both pavements of each road."""
     props = []
     for road in roads:
         for side in (-1.0, 1.0):
@@ -158,7 +158,7 @@ def _some_prop(rng: np.random.Generator, x_m: float, y_m: float, heading_rad: fl
 
 
 def prop_of_kind(rng: np.random.Generator, kind: str, at_m: Point, heading_rad: float) -> Prop:
-    """A prop of one kind, its size drawn from what is usual."""
+    """Draw a prop of one kind, of one of the usual sizes."""
     x_m, y_m = at_m
     least_m, most_m = _SIZES[kind]
     length_m, width_m, height_m = rng.uniform(least_m, most_m).round(2).tolist()
@@ -174,7 +174,7 @@ def prop_of_kind(rng: np.random.Generator, kind: str, at_m: Point, heading_rad: 
 
 
 def _beside(rng: np.random.Generator, road: Road, along_m: float, side: float) -> Prop:
-    """A prop on the pavement, or as near to it as its size allows."""
+    """Draw a prop on the pavement, or as near to it as its size allows."""
     prop = _some_prop(rng, 0.0, 0.0, road.heading_rad)
     _, width_m, _ = prop.size_m
 

@@ -26,26 +26,26 @@ class Place:
 
     @cached_property
     def kerbs_m(self) -> Floats:
-        """(n, 4): where the streets' surface ends, x and y of both ends of each segment."""
+        """Return the (n, 4) segments that bound the streets' surface, x and y of both ends."""
         return kerbs(self.roads)
 
     @cached_property
     def walls_m(self) -> Floats:
-        """(n, 4): the outer walls of the buildings, in the order of `plots`."""
+        """Return the (n, 4) outer walls of the buildings, in the order of `plots`."""
         return outlines([plot.corners for plot in self.plots])
 
     @property
     def charging_places(self) -> list[Prop]:
-        """The props at which the robot's battery is charged."""
+        """Return the props at which the robot's battery is charged."""
         return [prop for prop in self.props if prop.kind == CHARGING_PLACE]
 
     @property
     def charging_places_m(self) -> list[Point]:
-        """Where these stand."""
+        """Return where the charging places stand."""
         return [(prop.x_m, prop.y_m) for prop in self.charging_places]
 
     def message(self, closed: Collection[str] = (), gone: Collection[int] = ()) -> TrueTown:
-        """The place as it travels, with the streets named in `closed` closed, and without the
+        """Return the place as a message, with the streets named in `closed` closed, and without the
         buildings numbered in `gone`.
         """
         streets = []

@@ -26,12 +26,12 @@ class Road:
 
     @property
     def length_m(self) -> float:
-        """Distance from end to end."""
+        """Return the distance from end to end."""
         return math.dist(self.start, self.end)
 
     @property
     def extent_m(self) -> Point:
-        """x and y from start to end."""
+        """Return x and y from start to end."""
         start_x, start_y = self.start
         end_x, end_y = self.end
 
@@ -41,29 +41,29 @@ class Road:
 
     @property
     def heading_rad(self) -> float:
-        """Direction from start to end, counter-clockwise from x."""
+        """Return the direction from start to end, counter-clockwise from x."""
         dx_m, dy_m = self.extent_m
 
         return math.atan2(dy_m, dx_m)
 
     @property
     def middle(self) -> Point:
-        """The middle of the centre line."""
+        """Return the middle of the centre line."""
         return self.point(self.length_m / 2)
 
     @property
     def kerbs(self) -> Rectangle:
-        """West, south, east, north of the road's surface, where it runs along x or y."""
+        """Return west, south, east, north of the road's surface, if it runs along x or y."""
         return self.area(self.width_m / 2)
 
     @property
     def is_along_an_axis(self) -> bool:
-        """Whether it runs along x or y."""
+        """Return whether it runs along x or y."""
         dx_m, dy_m = self.extent_m
         return min(abs(dx_m), abs(dy_m)) < LEVEL_M
 
     def point(self, along_m: float, left_m: float = 0.0) -> Point:
-        """The point `along_m` from the start, `left_m` to the left of the centre line."""
+        """Return the point `along_m` from the start, `left_m` to the left of the centre line."""
         start_x, start_y = self.start
         heading_rad = self.heading_rad
         cos = math.cos(heading_rad)
@@ -75,8 +75,8 @@ class Road:
         return x_m, y_m
 
     def area(self, reach_m: float) -> Rectangle:
-        """West, south, east, north of a road along x or y, within `reach_m` of the centre line,
-        ends squared off.
+        """Return west, south, east, north of a road along x or y, within `reach_m` of the centre
+        line, ends squared off.
         """
         start_x, start_y = self.start
         end_x, end_y = self.end
@@ -108,7 +108,7 @@ class Plot:
 
     @property
     def footprint(self) -> Rectangle:
-        """West, south, east, north in metres."""
+        """Return the building's west, south, east, north in metres."""
         if self.outline:
             x_m, y_m = zip(*self.outline, strict=True)
             return min(x_m), min(y_m), max(x_m), max(y_m)
@@ -128,7 +128,7 @@ class Plot:
 
     @property
     def corners(self) -> tuple[Point, ...]:
-        """The corners of its walls, counter-clockwise."""
+        """Return the corners of its walls, counter-clockwise."""
         if self.outline:
             return self.outline
 
@@ -137,7 +137,7 @@ class Plot:
 
 
 def corners(middle: Point, heading_rad: float, size_m: Point) -> tuple[Point, Point, Point, Point]:
-    """The corners of a rectangle, counter-clockwise; `size_m`: along its heading, and across it."""
+    """Return a rectangle's corners, counter-clockwise; `size_m`: along its heading, and across."""
     x_m, y_m = middle
     length_m, width_m = size_m
     cos = math.cos(heading_rad)
@@ -156,7 +156,7 @@ def corners(middle: Point, heading_rad: float, size_m: Point) -> tuple[Point, Po
 
 
 def overlap(a: Rectangle, b: Rectangle, gap_m: float = 0.0) -> bool:
-    """Whether the rectangles come closer than `gap_m`."""
+    """Decide whether the rectangles come closer than `gap_m`."""
     a_west, a_south, a_east, a_north = a
     b_west, b_south, b_east, b_north = b
 

@@ -15,13 +15,11 @@ class Removal(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
 
     building: Annotated[
         int,
-        msgspec.Meta(ge=0, le=1_000_000, description="Its place among the town's, 0 to 1000000."),
+        msgspec.Meta(ge=0, le=1_000_000, description="Its place among the town's."),
     ]
     from_s: Annotated[
         float,
-        msgspec.Meta(
-            ge=0, le=1e9, description="Simulated time from which it is gone, in s, 0 to 1e9."
-        ),
+        msgspec.Meta(ge=0, le=1e9, description="Simulated time from which it is gone, in s."),
     ]
 
 
@@ -41,11 +39,11 @@ class RemovedBuildings:
 
     @property
     def numbers(self) -> frozenset[int]:
-        """The buildings that are gone now."""
+        """Return the buildings that are gone now."""
         return frozenset(self._gone)
 
     def advance(self, now_ns: int) -> bool:
-        """Follow the schedule up to a time; whether a building has gone since the last call."""
+        """Follow the schedule to a time; return whether a building has gone since the last call."""
         before = len(self._gone)
         while self._left and self._left[0].from_s * 1e9 <= now_ns:
             self._gone.add(self._left.pop(0).building)

@@ -17,7 +17,7 @@ STEP_M = 1.0
 
 
 def another_start(place: Place, number: int) -> Pose:
-    """The start of that number, from 1 on, in a place that was made from a seed, in either
+    """Draw the start of that number, from 1 on, in a place that was made from a seed, in either
     direction along its street.
     """
     rng = np.random.default_rng([place.seed, number, 0x57])
@@ -27,7 +27,7 @@ def another_start(place: Place, number: int) -> Pose:
 
 
 def start_on(rng: np.random.Generator, roads: Sequence[Road], props: Sequence[Prop]) -> Pose:
-    """A place in the middle of some street, with nothing within CLEAR_M of it."""
+    """Draw a place in the middle of some street, with nothing within CLEAR_M of it."""
     middles_m = np.array([(prop.x_m, prop.y_m) for prop in props]).reshape(-1, 2)
 
     for number in rng.permutation(len(roads)).tolist():

@@ -41,22 +41,22 @@ class Town(Place):
 
     @property
     def lap_m(self) -> float:
-        """The length of one lap along the centre lines."""
+        """Return the length of one lap along the centre lines."""
         closed = (self.corners[-1], *self.corners)
         lengths_m = [math.dist(a, b) for a, b in pairwise(closed)]
 
         return sum(lengths_m)
 
     def goals(self, laps: float = 1.0) -> list[Point]:
-        """The corners that are passed in `laps` laps, and the place where they end, in order, in
-        the frame of the start.
+        """Return the corners that are passed in `laps` laps, and the place where they end, in
+        order, in the frame of the start.
         """
         points = np.array(self.line(laps)[1:])
         start = np.array([self.start.x_m, self.start.y_m, self.start.heading_rad])
         return [(x_m, y_m) for x_m, y_m in transform_to(start, points).tolist()]
 
     def line(self, laps: float = 1.0) -> list[Point]:
-        """The start, the corners passed, the end."""
+        """Return the start, the corners passed, the end."""
         here = (self.start.x_m, self.start.y_m)
         points: list[Point] = [here]
         left_m = laps * self.lap_m
@@ -76,8 +76,8 @@ class Town(Place):
 
 
 def generate(seed: int, kinds: tuple[BuildingType, ...] = CATALOGUE) -> Town:
-    """The town of `seed`: the same every time, with at least MIN_BUILDINGS buildings, none on a
-    street or another.
+    """Make the town of `seed`: the same every time, with at least MIN_BUILDINGS buildings, none on
+    a street or another building.
 
     It has each of `kinds` once at most; there should be some more of them than MIN_BUILDINGS.
     """
@@ -164,7 +164,7 @@ class _Settlement:
 
 
 def _roads(rng: np.random.Generator, half_x_m: float, half_y_m: float) -> list[Road]:
-    """The four streets of the loop, and two stubs at opposite corners."""
+    """Make the four streets of the loop, and two stubs at opposite corners."""
     south_west = (-half_x_m, -half_y_m)
     south_east = (half_x_m, -half_y_m)
     north_east = (half_x_m, half_y_m)

@@ -18,7 +18,7 @@ OSM = "osm:"
 
 
 def check(town: str) -> None:
-    """Raise ConfigError where there is no town of that name: LOOP, BLOCKS, or OSM and a path."""
+    """Raise ConfigError if there is no town of that name: LOOP, BLOCKS, or OSM and a path."""
     is_extract = town.startswith(OSM) and town != OSM
     if not is_extract and town not in (LOOP, BLOCKS):
         raise ConfigError(
@@ -30,11 +30,11 @@ def check(town: str) -> None:
 def place(
     town: str, seed: int, size_m: float, *, start: int = 0, charging_places: int = 0
 ) -> Place:
-    """The town of that name, with so many charging places.
+    """Make the town of that name, with so many charging places.
 
     It is LOOP or BLOCKS, from `seed`, or OSM and the path of an extract; `size_m` is the side of a
     town of blocks. The robot begins where it usually does, or at another `start`, numbered from 1.
-    Raises UsageError where the extract makes no town, or the town has no room for so many charging
+    Raises UsageError if the extract makes no town, or the town has no room for so many charging
     places.
     """
     made = with_charging_places(_bare(town, seed, size_m), seed, charging_places)

@@ -31,7 +31,7 @@ class Buffer(NamedTuple):
 
 
 def depths_m(inverse_m: Floats) -> Floats:
-    """Depths from inverse depths of any shape, infinite where these are 0."""
+    """Compute depths from inverse depths of any shape, infinite where these are 0."""
     with np.errstate(divide="ignore"):
         depth_m: Floats = 1.0 / inverse_m
     return depth_m
@@ -49,19 +49,19 @@ class ColumnCamera:
 
     @property
     def half_field_of_view_rad(self) -> float:
-        """The angle between the axis and the side of the image that is farther from it."""
+        """Return the angle between the axis and the side of the image that is farther from it."""
         mount = self.mount
         half_px = max(mount.cx_px, mount.width_px - mount.cx_px)
         return math.atan(half_px / mount.fx_px)
 
     def column(self, forward_m: Floats, left_m: Floats) -> Floats:
-        """The image column, with a fraction, of points before the camera, of any shape."""
+        """Return the image column, with a fraction, of points before the camera, of any shape."""
         left_slope = left_m / forward_m
         columns: Floats = self.mount.cx_px - left_slope * self.mount.fx_px
         return columns
 
     def seen_from(self, pose: Floats, points_m: Floats) -> Floats:
-        """(..., 2) points of the world as forward and left of the camera of a robot at `pose`."""
+        """Return world points (..., 2) as forward and left of the camera of a robot at `pose`."""
         robot_m = transform_to(pose, points_m)
         robot_m[..., 0] -= self.mount.mount_forward_m
         return robot_m
@@ -96,8 +96,8 @@ class ColumnCamera:
 
 
 def _inverse_depth_of_lines(ends_m: Floats) -> tuple[Floats, Floats]:
-    """(n,) each: the inverse depth of the lines through (n, 2, 2) segments on the optical axis, and
-    its change with the slope to the left; 0 for lines through the camera.
+    """Compute the inverse depth of the lines through (n, 2, 2) segments on the optical axis, and
+    its change with the slope to the left, (n,) each; 0 for lines through the camera.
     """
     start_m = ends_m[:, 0]
     along_m = ends_m[:, 1] - start_m
@@ -115,7 +115,7 @@ def _inverse_depth_of_lines(ends_m: Floats) -> tuple[Floats, Floats]:
 
 
 def _before_camera(ends_m: Floats) -> Floats:
-    """(n, 2, 2) segments, cut off at NEAR_M before the camera."""
+    """Cut off (n, 2, 2) segments at NEAR_M before the camera."""
     forward_m = ends_m[..., 0]
     start_m = ends_m[:, 0]
     along_m = ends_m[:, 1] - start_m

@@ -48,12 +48,12 @@ class Lattice:
         self.cells = len(cells)
 
     def thinned(self, chosen: Indices) -> Singles:
-        """(k, 2): the mean of the chosen points in each cell, in the order of the cells."""
+        """Return the (k, 2) means of the chosen points in each cell, in the order of the cells."""
         return _means_m(self.points_m[chosen], self.cell[chosen], self.cells)
 
 
 def nearest_ground_m(camera: ColumnCamera) -> float:
-    """The depth of the ground in the lowest image row."""
+    """Return the depth of the ground in the lowest image row."""
     mount = camera.mount
     down = (mount.height_px - 1 - mount.cy_px) / mount.fy_px
     return mount.mount_height_m / down
@@ -62,10 +62,10 @@ def nearest_ground_m(camera: ColumnCamera) -> float:
 def road_points_m(
     lattice: Lattice, pose: Floats, depth_m: Floats, streets: Surfaces, error_m: Floats
 ) -> Singles:
-    """(n, 2): the points that show a street, in the robot's frame, thinned; what stands at
+    """Return the (n, 2) points that show a street, in the robot's frame, thinned; what stands at
     `depth_m` in each column hides what is behind it.
 
-    `error_m` is by how much the street is seen beside its place.
+    The street is seen `error_m` beside its place.
     """
     visible = np.flatnonzero(lattice.depth_m < depth_m[lattice.column])
     seen_m = lattice.points_m[visible] - error_m
@@ -74,7 +74,7 @@ def road_points_m(
 
 
 def is_on_street(points_m: Floats, pose: Floats, streets: Surfaces) -> Booleans:
-    """(k,): which of (k, 2) points in the robot's frame lie on a street."""
+    """Mark, (k,), those of (k, 2) points in the robot's frame that lie on a street."""
     here_along_m, here_left_m = streets.local(pose[None, :2])
     # Each street's directions along and to the left, in the robot's frame.
     along = rotate(streets.ahead, -pose[2])
@@ -94,7 +94,7 @@ def is_on_street(points_m: Floats, pose: Floats, streets: Surfaces) -> Booleans:
 def boundary_points_m(
     camera: ColumnCamera, pose: Floats, depth_m: Floats, kerbs_m: Floats, error_m: Floats
 ) -> Floats:
-    """(n, 2): the points of (k, 2) kerbs that are seen, in the robot's frame."""
+    """Return those of (k, 2) points of kerbs that are seen, (n, 2), in the robot's frame."""
     seen_m = camera.seen_from(pose, kerbs_m) + error_m
     is_ahead = seen_m[:, 0] > nearest_ground_m(camera)
     ahead_m = seen_m[is_ahead]
@@ -118,7 +118,7 @@ def _is_inside(column: Floats, width: int, border: float = 0.0) -> Booleans:
 
 
 def thin(points_m: Floats) -> Singles:
-    """The mean of the points (n, 2) within MAX_RANGE_M in each cell, in the order of the cells."""
+    """Average the points (n, 2) within MAX_RANGE_M in each cell, in the order of the cells."""
     range_m = np.hypot(points_m[:, 0], points_m[:, 1])
     near_m = points_m[range_m <= MAX_RANGE_M]
     cell = _cell_numbers(near_m)
@@ -126,7 +126,7 @@ def thin(points_m: Floats) -> Singles:
 
 
 def _means_m(points_m: Floats, cell: npt.NDArray[np.intp], cells: int) -> Singles:
-    """(k, 2): the mean of the points (n, 2) in each of the cells that they are in, (n,)."""
+    """Average the points (n, 2) in each of the cells (n,) that they are in, and return (k, 2)."""
     count = np.bincount(cell, minlength=cells)
     occupied = np.flatnonzero(count)
     sum_x_m = np.bincount(cell, points_m[:, 0], minlength=cells)
@@ -138,7 +138,7 @@ def _means_m(points_m: Floats, cell: npt.NDArray[np.intp], cells: int) -> Single
 
 
 def _cell_numbers(points_m: Floats) -> npt.NDArray[np.intp]:
-    """The number of the cell of each point (n, 2), x before y."""
+    """Return the number of the cell of each point (n, 2), x before y."""
     in_cells = points_m / CELL_M
     lower = np.floor(in_cells).astype(np.intp)
     row, column = lower.T + _CELLS

@@ -36,73 +36,64 @@ class PerceptErrors(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fi
 
     detected: Annotated[
         Share,
-        msgspec.Meta(
-            description="Probability that a building in view is found, 0 to 1 (detect_recall)."
-        ),
+        msgspec.Meta(description="Probability that a building in view is found (detect_recall)."),
     ] = 0.959
     right_name: Annotated[
         Share,
-        msgspec.Meta(
-            description="Probability that a found building gets its own name, 0 to 1 (top1)."
-        ),
+        msgspec.Meta(description="Probability that a found building gets its own name (top1)."),
     ] = 0.974
     precision: Annotated[
         PositiveShare,
-        msgspec.Meta(
-            description="Share of found things that are buildings, above 0 to 1 (detect_precision)."
-        ),
+        msgspec.Meta(description="Share of found things that are buildings (detect_precision)."),
     ] = 0.968
     named_phantoms: Annotated[
         Share,
         msgspec.Meta(
-            description="Probability that what is no building gets a known name, 0 to 1 (1 - top1)."
+            description="Probability that what is no building gets a known name (1 - top1)."
         ),
     ] = 0.026
     range_sd_share: Annotated[
         Share,
         msgspec.Meta(
-            description="Standard deviation of range over range, 0 to 1 (depth_error, a median, "
-            "/ 0.6745)."
+            description="Standard deviation of range over range (depth_error, a median, / 0.6745)."
         ),
     ] = 0.017 / NORMAL_MEDIAN
     bearing_sd_rad: Annotated[
         PositiveRadians,
-        msgspec.Meta(
-            description="Standard deviation of bearing, in rad, above 0 to 6.28 (assumed)."
-        ),
+        msgspec.Meta(description="Standard deviation of bearing, in rad (assumed)."),
     ] = 0.01
     place_recall: Annotated[
         Share,
         msgspec.Meta(
-            description="Probability that a place passed in the same direction is recognized, "
-            "0 to 1 (sequence_recall_at_99p)."
+            description="Probability that a place passed in the same direction is recognized "
+            "(sequence_recall_at_99p)."
         ),
     ] = 0.965
     place_precision: Annotated[
         Share,
         msgspec.Meta(
-            description="Probability that a recognized place is the right one, 0 to 1 (the "
-            "precision at which that recall was measured)."
+            description="Probability that a recognized place is the right one (the precision at "
+            "which that recall was measured)."
         ),
     ] = 0.99
     road_edge_sd_m: Annotated[
         Share,
         msgspec.Meta(
-            description="Standard deviation of the road's boundary, in m, 0 to 1 "
-            "(road_edge_error_m, a median, / 0.6745)."
+            description="Standard deviation of the road's boundary, in m (road_edge_error_m, a "
+            "median, / 0.6745)."
         ),
     ] = 0.058 / NORMAL_MEDIAN
     nearest_m: Annotated[
         PositiveMetres,
-        msgspec.Meta(description="Least range of a percept, in m, above 0 to 10000."),
+        msgspec.Meta(description="Least range of a percept, in m."),
     ] = 5.0
     farthest_m: Annotated[
         PositiveMetres,
-        msgspec.Meta(description="Greatest range of a percept, in m, above 0 to 10000."),
+        msgspec.Meta(description="Greatest range of a percept, in m."),
     ] = CAMERA_RANGE_M
     field_of_view_rad: Annotated[
         PositiveRadians,
-        msgspec.Meta(description="Horizontal field of view, in rad, above 0 to 6.28."),
+        msgspec.Meta(description="Horizontal field of view, in rad."),
     ] = math.radians(75)
 
 
@@ -182,7 +173,7 @@ class PerceptSim:
     def _percept(
         self, label: str, number: int, range_m: float, bearing_rad: float, whole: bool = True
     ) -> Percept:
-        """A percept of landmark `number` at `range_m` and `bearing_rad`, with noise on both."""
+        """Draw landmark `number`'s percept at `range_m` and `bearing_rad`, with noise on both."""
         errors = self._errors
         landmark = self._landmarks[number]
         range_sd_m = max(errors.range_sd_share * range_m, MIN_RANGE_SD_M)

@@ -102,9 +102,7 @@ class Surroundings:
 
 
 def _within(segments_m: Floats, x_m: float, y_m: float, reach_m: float) -> Booleans:
-    """(n,): which of (n, 4) segments have a bounding box that comes within reach, along both
-    axes.
-    """
+    """Mark, (n,), those of (n, 4) segments whose bounding box is within reach along both axes."""
     at_m = np.array([x_m, y_m])
     one_end_m = segments_m[:, :2]
     other_end_m = segments_m[:, 2:]

@@ -119,8 +119,8 @@ class TownSensors:
         )
 
     def _buildings(self, pose: Pose, at: Floats, walls: Buffer, near: Near) -> list[Percept]:
-        """Percepts of the buildings that no other hides. One is cut by the image's border or by
-        another building.
+        """Return percepts of the buildings that no other hides. Those that the image's border or
+        another building cuts are not whole.
         """
         shown = near.plot[walls.segment[walls.segment != NOTHING]]
         columns = np.bincount(shown, minlength=len(self._corners_m))

@@ -59,12 +59,12 @@ class StereoCamera:
             self.capture()
 
     def capture(self) -> tuple[Image, Image]:
-        """The left and the right image from where the robot is."""
+        """Render the left and the right image from where the robot is."""
         left, right = (self._render(station) for station in self._stations())
         return left.image, right.image
 
     def frame(self, stamp_ns: int, number: int) -> StereoFrame:
-        """As `capture`, as it travels."""
+        """Render as `capture` does, and return the images as a message."""
         left, right = self.capture()
         return StereoFrame(
             stamp_ns=stamp_ns,
@@ -77,8 +77,8 @@ class StereoCamera:
     def capture_labelled(
         self, light: Light | None = None, rng: np.random.Generator | None = None
     ) -> tuple[Exposure, Exposure]:
-        """As `capture`, with true depth and bodies, for training and tests; in `light`, with noise
-        from `rng`.
+        """Render as `capture` does, with true depth and bodies, for training and tests; in `light`,
+        with noise from `rng`.
         """
         left_station, right_station = self._stations()
         left = self._render(left_station, True, light)
@@ -101,14 +101,14 @@ class StereoCamera:
         light: Light,
         rng: np.random.Generator,
     ) -> Exposure:
-        """The exposure in `light`, shadows up to `top_m`."""
+        """Return the exposure in `light`, with shadows up to `top_m`."""
         rays = self._rays @ station.axes.T.astype(np.float32)
         bright = brightness(exposure.depth_m, rays, station.at_m, top_m, light)
         image = expose(exposure.image, bright, light, rng)
         return replace(exposure, image=image)
 
     def _stations(self) -> tuple[Station, Station]:
-        """The left and the right camera."""
+        """Locate the left and the right camera."""
         position_m, quaternion = self._world.robot.position_and_orientation()
         matrix = pybullet.getMatrixFromQuaternion(quaternion)
         robot_axes = np.reshape(matrix, (3, 3))
@@ -129,7 +129,7 @@ class StereoCamera:
     def _render(
         self, station: Station, labelled: bool = False, light: Light | None = None
     ) -> Exposure:
-        """What one camera sees, with depth and bodies where it is `labelled`."""
+        """Render what one camera sees, with depth and bodies if it is `labelled`."""
         world = self._world
         if world.egl is not None:
             world.egl.check()
@@ -168,8 +168,8 @@ class StereoCamera:
 
 
 def _rays(calibration: Calibration) -> Singles:
-    """(h, w, 3): the direction of each pixel in the camera's axes, of length 1 along the optical
-    axis.
+    """Compute the (h, w, 3) direction of each pixel in the camera's axes, of length 1 along the
+    optical axis.
     """
     columns = np.arange(calibration.width_px)
     rows = np.arange(calibration.height_px)
@@ -185,7 +185,7 @@ def _rays(calibration: Calibration) -> Singles:
 
 
 def _projection(mount: Calibration) -> list[float]:
-    """OpenGL's projection matrix, column by column, of a pinhole camera centred on its image."""
+    """Return OpenGL's projection matrix of a pinhole camera centred on its image, by columns."""
     range_m = NEAR_M - FAR_M
     a = (FAR_M + NEAR_M) / range_m
     b = 2 * FAR_M * NEAR_M / range_m

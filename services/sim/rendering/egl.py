@@ -27,7 +27,7 @@ class Egl:
 
     @classmethod
     def load(cls, client: int) -> Egl | None:
-        """The plugin, loaded into `client`; None if there is none. Raises CogmapError if one is
+        """Load the plugin into `client`; return None if there is none. Raises CogmapError if one is
         loaded already.
         """
         if cls._loaded:

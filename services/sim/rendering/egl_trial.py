@@ -39,7 +39,7 @@ class Trial:
             )
 
     def succeeds(self) -> bool:
-        """Whether the plugin loads here."""
+        """Wait for the trial, and decide whether the plugin loads here."""
         self._outcome.settimeout(_PROBE_S)
         try:
             # It stays there for the next process that asks.
@@ -54,7 +54,7 @@ class Trial:
 
 @cache
 def trial() -> Trial | None:
-    """Try the plugin, unless that has begun; None where there is nothing to try."""
+    """Try the plugin, unless that has begun; return None if there is nothing to try."""
     try:
         ctypes.CDLL("libEGL.so.1")
     except OSError:
@@ -64,6 +64,6 @@ def trial() -> Trial | None:
 
 @cache
 def works() -> bool:
-    """Whether the plugin loads here."""
+    """Decide whether the plugin loads here."""
     begun = trial()
     return begun is not None and begun.succeeds()

@@ -21,7 +21,7 @@ _ROOF_PICTURE = 4
 
 
 def side(kind: BuildingType, width_m: float, number: int) -> Image:
-    """Wall `number` of a building, uint8 (height, width, 3): number 0 is the front and has the
+    """Draw wall `number` of a building, uint8 (height, width, 3). Number 0 is the front and has the
     door.
     """
     rng = _generator(kind, number)
@@ -50,7 +50,7 @@ def side(kind: BuildingType, width_m: float, number: int) -> Image:
 
 
 def roof(kind: BuildingType) -> Image:
-    """The roof from above, uint8 (depth, width, 3), in courses."""
+    """Draw the roof from above, uint8 (depth, width, 3), in courses."""
     depth_px = round(kind.depth_m * PX_PER_M)
     width_px = round(kind.width_m * PX_PER_M)
 
@@ -63,7 +63,7 @@ def roof(kind: BuildingType) -> Image:
 
 
 def _generator(kind: BuildingType, number: int) -> np.random.Generator:
-    """A source of random numbers for one picture of a type."""
+    """Make a source of random numbers for one picture of a type."""
     name = kind.name.encode()
     return np.random.default_rng([zlib.crc32(name), number])
 

@@ -40,7 +40,7 @@ class Light:
 
     @property
     def sun(self) -> tuple[float, float, float]:
-        """The unit vector to the sun: east, north, up."""
+        """Return the unit vector to the sun: east, north, up."""
         flat = math.cos(self.sun_elevation_rad)
 
         east = flat * math.cos(self.sun_azimuth_rad)
@@ -51,7 +51,7 @@ class Light:
 
 
 def some_light(rng: np.random.Generator) -> Light:
-    """Any hour of a day with the sun up, any weather but night and fog."""
+    """Draw the light of any hour of a day with the sun up, in any weather but fog."""
     elevation_rad = float(rng.uniform(0.25, 1.2))
     low_sun = 1.2 - elevation_rad
     warmth = float(rng.uniform(-0.06, 0.1) + 0.06 * low_sun)
@@ -78,8 +78,8 @@ def some_light(rng: np.random.Generator) -> Light:
 
 
 def relief(boxes: list[Box]) -> Singles:
-    """The height of the town in each cell of _CELL_M, float32 (n, n), rows from south to north,
-    columns from west.
+    """Compute the height of the town in each cell of _CELL_M, float32 (n, n), rows from south to
+    north, columns from west to east.
     """
     shape = (_CELLS, _CELLS)
     heights_m = np.zeros(shape, np.float32)
@@ -95,8 +95,8 @@ def relief(boxes: list[Box]) -> Singles:
 
 
 def shadow_top(heights_m: Singles, light: Light) -> Singles:
-    """The height up to which each cell of a relief lies in the shadow of others, in metres, float32
-    like `heights_m`.
+    """Compute the height up to which each cell of a relief lies in the shadow of others, in metres,
+    float32 like `heights_m`.
     """
     east, north, up = light.sun
     flat = math.hypot(east, north)
@@ -122,7 +122,7 @@ def shadow_top(heights_m: Singles, light: Light) -> Singles:
 
 
 def _shifted(cells: int) -> tuple[slice, slice]:
-    """The cells that have one `cells` further on, and those."""
+    """Return the cells that have another one `cells` further on, and these others."""
     ahead = max(0, cells)
     back = max(0, -cells)
     return slice(back, _CELLS - ahead), slice(ahead, _CELLS - back)
@@ -131,7 +131,7 @@ def _shifted(cells: int) -> tuple[slice, slice]:
 def brightness(
     depth_m: Singles, rays: Singles, at: Floats, top_m: Singles, light: Light
 ) -> Singles:
-    """The brightness of each pixel under `light`, float32 (h, w) from `shade` to 1.
+    """Compute the brightness of each pixel under `light`, float32 (h, w) from `shade` to 1.
 
     `depth_m` (h, w) is 0 in the sky; `rays` (h, w, 3) are the directions of the pixels in the
     world, of length 1 along the optical axis, from `at`; `top_m` is the result of `shadow_top`.
@@ -149,7 +149,7 @@ def brightness(
 
 
 def expose(image: Image, bright: Singles, light: Light, rng: np.random.Generator) -> Image:
-    """`image` (h, w, 3) as the camera exposes it, where `bright` (h, w) is left of the light."""
+    """Expose `image` (h, w, 3) as the camera does; `bright` (h, w) is how much light is left."""
     cast = np.asarray(light.cast, np.float32)
     surface = image.astype(np.float32) / 255
     lit = surface * bright[..., None]

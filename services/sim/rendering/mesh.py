@@ -71,7 +71,7 @@ class Mesh:
         self.polygon(vertices, uvs)
 
     def obj(self) -> str:
-        """The text of a Wavefront OBJ file."""
+        """Format the mesh as the text of a Wavefront OBJ file."""
         lines = [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in self.vertices]
         lines += [f"vt {u:.6f} {1 - v:.6f}" for u, v in self.uvs]
         lines += [f"vn {x:.4f} {y:.4f} {z:.4f}" for x, y, z in self.normals]
@@ -153,8 +153,8 @@ def building(kind: BuildingType) -> tuple[Mesh, Image]:
 
 
 def prism(kind: BuildingType, outline: Sequence[Point]) -> tuple[Mesh, Image]:
-    """The walls of a building over its outline, counter-clockwise, and the picture on all of them:
-    a bay that is repeated. Its roof is flat, and seen by nobody in the street.
+    """Make the walls of a building over its outline, counter-clockwise, and the picture on all of
+    them: a bay that is repeated. Its roof is flat, and nobody in the street sees it.
     """
     bay = facade.side(kind, _BAY_M, 1)
     picture, _ = _side_by_side([bay])
@@ -184,7 +184,7 @@ def cuts(start: float, end: float, cell_m: float) -> list[float]:
 
 
 def _side_by_side(pictures: list[Image]) -> tuple[Image, list[int]]:
-    """One picture with all of them in a row, and where each begins, in pixels."""
+    """Join all pictures in a row; return the row, and where each begins, in pixels."""
     heights_px = [picture.shape[0] for picture in pictures]
     widths_px = [picture.shape[1] for picture in pictures]
     lefts = [0, *itertools.accumulate(widths_px)]

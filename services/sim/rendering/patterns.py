@@ -14,7 +14,7 @@ STOREY_M = 3.0
 
 
 def bands(wall: Wall) -> None:
-    """A band above each storey."""
+    """Paint a band above each storey."""
     lowest_m = STOREY_M - 0.35
     bands_m = np.arange(lowest_m, wall.height_m, STOREY_M)
     for z_m in bands_m.tolist():
@@ -22,14 +22,14 @@ def bands(wall: Wall) -> None:
 
 
 def stripes(wall: Wall) -> None:
-    """Upright stripes, a metre each."""
+    """Paint upright stripes, a metre each."""
     end_m = int(wall.width_m) + 1
     for x_m in range(0, end_m, 2):
         wall.box(x_m, 0, 0.9, wall.height_m, wall.kind.accent)
 
 
 def columns(wall: Wall) -> None:
-    """Columns under an architrave."""
+    """Paint columns under an architrave."""
     accent = wall.kind.accent
     number = max(3, round(wall.width_m / 2.6))
     last_m = wall.width_m - 0.9
@@ -42,7 +42,7 @@ def columns(wall: Wall) -> None:
 
 
 def checker(wall: Wall) -> None:
-    """Squares of a metre."""
+    """Paint squares of a metre."""
     accent = wall.kind.accent
     width = int(wall.width_m) + 1
     height = int(wall.height_m) + 1
@@ -53,7 +53,7 @@ def checker(wall: Wall) -> None:
 
 
 def planks(wall: Wall) -> None:
-    """Level planks."""
+    """Paint level planks."""
     accent = wall.kind.accent
     planks_m = np.arange(0.5, wall.height_m, 1.2)
     for z_m in planks_m.tolist():
@@ -61,7 +61,7 @@ def planks(wall: Wall) -> None:
 
 
 def timber(wall: Wall) -> None:
-    """A timber frame with braces on the ground floor."""
+    """Paint a timber frame with braces on the ground floor."""
     accent = wall.kind.accent
     bays = max(2, round(wall.width_m / 2.5))
     bay_m = wall.width_m / bays
@@ -79,7 +79,7 @@ def timber(wall: Wall) -> None:
 
 
 def frame(wall: Wall) -> None:
-    """A frame along the top and both edges."""
+    """Paint a frame along the top and both edges."""
     accent = wall.kind.accent
 
     band_m = 0.14 * wall.height_m

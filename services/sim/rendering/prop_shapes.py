@@ -42,7 +42,7 @@ class Ring(NamedTuple):
 
 
 def shape(prop: Prop) -> tuple[Mesh, Image]:
-    """The prop around the origin, length along x, and its picture: two colours, side by side."""
+    """Make a prop at the origin, length along x, and its picture: two colours, side by side."""
     rng = np.random.default_rng(prop.look)
 
     mesh = Mesh()
@@ -190,7 +190,7 @@ def _any_colour(rng: np.random.Generator, least: int, most: int) -> Colour:
 
 
 def _tinted(colour: Colour, rng: np.random.Generator) -> Colour:
-    """`colour`, its hue and brightness varied a little."""
+    """Vary the hue and brightness of `colour` a little."""
     hue, saturation, value = _converted(colour, cv2.COLOR_RGB2HSV)
     new_hue = (hue + int(rng.integers(-8, 9))) % 180
 
@@ -200,7 +200,7 @@ def _tinted(colour: Colour, rng: np.random.Generator) -> Colour:
 
 
 def _converted(colour: Colour, conversion: int) -> Colour:
-    """`colour` in another colour space, by one of OpenCV's conversions."""
+    """Convert `colour` to another colour space, by one of OpenCV's conversions."""
     pixel = np.array([[colour]], np.uint8)
     first, second, third = cv2.cvtColor(pixel, conversion)[0, 0].tolist()
     return first, second, third

@@ -70,8 +70,8 @@ def grass() -> Mesh:
 
 
 def _pave(mesh: Mesh, road: Road, reach_m: float, z_m: float, grain_m: tuple[float, float]) -> None:
-    """Cover what lies within `reach_m` of a road, ends squared off; `grain_m`: as of tiles and
-    cells in `Mesh`.
+    """Cover the ground within `reach_m` of a road, ends squared off; `grain_m` holds `tile_m` and
+    `cell_m` as in `Mesh`.
     """
     tile_m, cell_m = grain_m
     if road.is_along_an_axis:

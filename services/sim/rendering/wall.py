@@ -52,7 +52,7 @@ class Wall:
         cv2.line(self.image, start, end, colour, _pixels(width_m))
 
     def _pixel(self, x_m: float, z_m: float) -> tuple[int, int]:
-        """Column and row."""
+        """Return the column and row of a point."""
         return _pixels(x_m), _pixels(self.height_m - z_m)
 
 
@@ -61,7 +61,7 @@ def _pixels(length_m: float) -> int:
 
 
 def shaded(colour: Colour, factor: float) -> Colour:
-    """`colour`, darker or lighter."""
+    """Make `colour` darker or lighter."""
     levels = [round(factor * level) for level in colour]
 
     red, green, blue = (min(255, level) for level in levels)
@@ -69,7 +69,7 @@ def shaded(colour: Colour, factor: float) -> Colour:
 
 
 def plain(side_px: int, colour: Colour) -> Image:
-    """A square picture of one colour."""
+    """Make a square picture of one colour."""
     shape = (side_px, side_px, 3)
     return np.full(shape, colour, np.uint8)
 

@@ -47,16 +47,16 @@ class Bodies:
         self._prefix.rmdir()
 
     def model(self, surface: Mesh, picture: Image) -> Model:
-        """A shape with a picture on it, to be added."""
+        """Make a shape with a picture on it, to be added."""
         return self.painted(surface, self.texture(picture))
 
     def painted(self, surface: Mesh, texture: int) -> Model:
-        """A shape with a texture on it."""
+        """Make a shape with a texture on it."""
         self._models += 1
         return Model(self._models, surface.obj(), texture)
 
     def texture(self, picture: Image) -> int:
-        """A picture, loaded."""
+        """Load a picture, and return its number."""
         bgr = np.ascontiguousarray(picture[..., ::-1])
         _, bmp = cv2.imencode(".bmp", bgr)
         self._textures += 1
@@ -64,7 +64,7 @@ class Bodies:
             return int(pybullet.loadTexture(path, physicsClientId=self._client))
 
     def box(self, half_m: tuple[float, float, float], middle_m: float) -> int:
-        """A box that nothing passes, its middle at height `middle_m`, for `add`."""
+        """Make a box that nothing passes, its middle at height `middle_m`, for `add`."""
         return int(
             pybullet.createCollisionShape(
                 pybullet.GEOM_BOX,
@@ -75,7 +75,7 @@ class Bodies:
         )
 
     def walls(self, outline: Sequence[Point], height_m: float) -> int:
-        """Walls that nothing passes, over a polygon, for `add`."""
+        """Make walls that nothing passes, over a polygon, for `add`."""
         count = len(outline)
         vertices = [(x, y, 0.0) for x, y in outline]
         vertices += [(x, y, height_m) for x, y in outline]
@@ -126,7 +126,7 @@ class Bodies:
 
     @contextmanager
     def _file(self, name: str, content: bytes) -> Iterator[str]:
-        """The path of a file with `content`, which is removed afterwards."""
+        """Write `content` to a file, give its path, and remove the file afterwards."""
         path = self._prefix.with_name(f"{self._prefix.name}-{name}")
         try:
             with path.open("xb") as file:

@@ -20,7 +20,7 @@ class Builder:
         self._layers = [bodies.texture(picture) for picture in layers]
 
     def soil(self) -> int:
-        """The ground around and between the streets, which carries the robot."""
+        """Add the ground around and between the streets, which carries the robot."""
         half_m = (scenery.GROUND_M, scenery.GROUND_M, 1.0)
         floor = self._bodies.box(half_m, middle_m=-1.0)
         model = self._bodies.painted(scenery.grass(), self._grass)
@@ -28,11 +28,11 @@ class Builder:
         return self._bodies.add(model, floor)
 
     def sky(self) -> int:
-        """The ring of hills and clouds."""
+        """Add the ring of hills and clouds."""
         return self._bodies.add(self._bodies.model(*scenery.sky()))
 
     def streets(self, roads: Sequence[Road]) -> list[int]:
-        """Pavements, asphalt, and the lines on it, where there are any."""
+        """Add pavements, asphalt, and the lines on it, if there are any."""
         added = []
         for surface, texture in zip(scenery.streets(roads), self._layers, strict=True):
             if surface.triangles:
@@ -55,7 +55,7 @@ class Builder:
         return self._bodies.add(model, solid, at_m)
 
     def prop(self, prop: Prop, is_solid: bool) -> int:
-        """A prop, which nothing passes where it is solid."""
+        """Add a prop, which nothing passes if it is solid."""
         model = self._bodies.model(*prop_shapes.shape(prop))
         at_m = (prop.x_m, prop.y_m)
         solid = self._box(prop.solid_size_m) if is_solid else NOT_SOLID

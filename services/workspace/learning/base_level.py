@@ -31,7 +31,7 @@ known best is kept no longer then, and is forgotten at once when it is missing t
 def learned_operations(
     broadcasts: Iterable[Broadcast], graph: Graph, cycle: int
 ) -> list[Operation]:
-    """The nodes of `broadcasts` that `graph` still has, as of `cycle`, with their new base levels,
+    """Return the nodes of `broadcasts` that `graph` still has, as of `cycle`, with new base levels,
     and the attention codelets that keep something, with the cycle in which they were conscious.
     """
     learned: dict[str, AnyNode] = {}

@@ -20,14 +20,14 @@ class Consciousness:
         self._had_broadcast = False
 
     def restore(self, cycle: int) -> None:
-        """After a restart in `cycle`: wait for no competition before, which may never come, and
-        learn nothing twice.
+        """Resume in `cycle` after a restart: wait for no competition before, which may never come,
+        and learn nothing twice.
         """
         self._learned_cycle = max(0, cycle - 1)
         self._competition_cycle = cycle
 
     def on_competition(self, competition: Competition) -> None:
-        """The global workspace has come so far."""
+        """Note how far the global workspace has come."""
         if competition.cycle >= self._competition_cycle:
             self._competition_cycle = competition.cycle
             self._had_broadcast = bool(competition.trigger)
@@ -38,7 +38,7 @@ class Consciousness:
             self._broadcasts[broadcast.cycle] = broadcast
 
     def complete(self, ended_cycle: int) -> bool:
-        """Whether all that came of the cycle that has ended is known."""
+        """Decide whether all that came of the cycle that has ended is known."""
         if not self._awaited:
             return True
         if self._competition_cycle < ended_cycle:
@@ -48,7 +48,7 @@ class Consciousness:
         return not self._had_broadcast or is_learned or ended_cycle in self._broadcasts
 
     def take(self, ended_cycle: int) -> list[Broadcast]:
-        """The broadcasts up to that of `ended_cycle`, in their order, once each."""
+        """Take the broadcasts up to that of `ended_cycle`, in their order, once each."""
         cycles = sorted(cycle for cycle in self._broadcasts if cycle <= ended_cycle)
         taken = [self._broadcasts.pop(cycle) for cycle in cycles]
         self._learned_cycle = max(self._learned_cycle, ended_cycle)

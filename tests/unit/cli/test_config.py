@@ -92,7 +92,7 @@ def test_the_commented_file_reads_back_to_the_same(sim: dict[str, Any]) -> None:
 def test_each_key_has_its_description_unit_and_range_before_it() -> None:
     text = printed("--seed", "3")
 
-    assert "# Width of a camera image, in pixels, 64 to 1024.\nwidth_px = 320\n" in text
+    assert "# Width of a camera image, in pixels. (64 to 1024)\nwidth_px = 320\n" in text
     assert "seed = 3\n" in text
 
 

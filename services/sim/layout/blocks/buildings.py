@@ -24,7 +24,7 @@ MIN_LENGTH_M = 12.0
 def settle(
     rng: np.random.Generator, roads: tuple[Road, ...], districts: Districts
 ) -> tuple[Plot, ...]:
-    """Buildings wherever one fits along the roads."""
+    """Place buildings wherever one fits along the roads."""
     settlement = _Settlement(rng, roads, districts)
     for road in roads:
         if road.length_m >= MIN_LENGTH_M:

@@ -86,7 +86,7 @@ class Districts:
     all: tuple[District, ...]
 
     def at(self, x_m: float, y_m: float) -> District:
-        """The district of a place."""
+        """Return the district of a place."""
         middle_x = _block_middle(self.grid.x_m, x_m)
         middle_y = _block_middle(self.grid.y_m, y_m)
         middle = (middle_x, middle_y)
@@ -95,7 +95,7 @@ class Districts:
 
 
 def _block_middle(lines_m: tuple[float, ...], at_m: float) -> float:
-    """The middle of the block between two of the lines that holds `at_m`, or is nearest to it."""
+    """Return the middle of the block between two lines that holds or is nearest to `at_m`."""
     after = int(np.searchsorted(lines_m, at_m))
     last = min(max(after, 1), len(lines_m) - 1)
 
@@ -125,7 +125,7 @@ def divide(rng: np.random.Generator, grid: Grid) -> Districts:
 
 
 def _spread(rng: np.random.Generator, grid: Grid, count: int) -> list[Point]:
-    """Middles of `count` blocks: of some tries those that are farthest from one another."""
+    """Draw the middles of `count` blocks: of some tries those that are farthest apart."""
     middles = []
     for x_m in grid.x_m[1:]:
         for y_m in grid.y_m[1:]:
@@ -180,7 +180,7 @@ class Builder:
             self._free[function] = [str(name) for name in shuffled]
 
     def next(self, district: District) -> BuildingType:
-        """A kind that the district may have next."""
+        """Choose a kind that the district may have next."""
         function = district.function
         if self._rng.random() >= OWN_FUNCTION:
             function = str(self._rng.choice(list(FUNCTIONS)))
@@ -195,7 +195,7 @@ class Builder:
 
 
 def function_of(kind: BuildingType) -> str:
-    """What a kind is used for, by its name."""
+    """Return what a kind is used for, by its name."""
     invented, _, _ = kind.name.partition("-")
     return FUNCTION_OF.get(kind.name, invented)
 
@@ -222,7 +222,7 @@ def _invent(rng: np.random.Generator, name: str, function: str, style: Style) ->
 
 
 def _paint(rng: np.random.Generator, hue: float, value: tuple[float, float]) -> Colour:
-    """A colour near a hue."""
+    """Draw a colour near a hue."""
     deviation = float(rng.normal(0.0, 0.03))
     saturation = float(rng.uniform(0.35, 0.8))
     brightness = float(rng.uniform(*value))

@@ -22,7 +22,7 @@ ASIDE_M = (5.0, 8.0)
 def furnish(
     rng: np.random.Generator, streets: Streets, plots: tuple[Plot, ...]
 ) -> tuple[Prop, ...]:
-    """Props on the pavements, in the streets and on the square."""
+    """Draw props on the pavements, in the streets and on the square."""
     on_pavements = line_pavements(rng, streets.roads, plots, PAVEMENT_SPACING_M)
 
     # Cars at either kerb, one at a time, away from the crossings.

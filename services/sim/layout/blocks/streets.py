@@ -72,18 +72,18 @@ class Grid:
 
     @property
     def crossings(self) -> list[Crossing]:
-        """All of them, column by column."""
+        """Return all crossings, column by column."""
         columns = range(len(self.x_m))
         rows = range(len(self.y_m))
         return [(column, row) for column in columns for row in rows]
 
     def at(self, crossing: Crossing) -> Point:
-        """Where a crossing is."""
+        """Return where a crossing is."""
         column, row = crossing
         return self.x_m[column], self.y_m[row]
 
     def stretches(self) -> list[Stretch]:
-        """All stretches between neighbouring crossings."""
+        """Return all stretches between neighbouring crossings."""
         found: list[Stretch] = []
         for column, row in self.crossings:
             if column + 1 < len(self.x_m):
@@ -94,13 +94,13 @@ class Grid:
         return found
 
     def line(self, stretch: Stretch) -> int:
-        """The number of the line that a stretch is part of: those along y first."""
+        """Return the number of the line that a stretch is part of: those along y come first."""
         (column, row), (other_column, _) = stretch
         is_along_y = column == other_column
         return column if is_along_y else len(self.x_m) + row
 
     def width_m(self, stretch: Stretch) -> float:
-        """The width of a stretch."""
+        """Return the width of a stretch."""
         widths_m = (*self.width_x_m, *self.width_y_m)
         return widths_m[self.line(stretch)]
 
@@ -116,7 +116,7 @@ class Streets:
 
 
 def plan(rng: np.random.Generator, size_m: float) -> Streets:
-    """The streets of a town of `size_m` to the side."""
+    """Plan the streets of a town of `size_m` to the side."""
     grid = _grid(rng, size_m)
     names = _Names(rng, grid)
 
@@ -144,7 +144,7 @@ def _grid(rng: np.random.Generator, size_m: float) -> Grid:
 
 
 def _lines_m(rng: np.random.Generator, size_m: float) -> tuple[float, ...]:
-    """Where the lines of one direction lie, about BLOCK_M apart."""
+    """Draw where the lines of one direction lie, about BLOCK_M apart."""
     span_m = size_m - 2 * EDGE_M
     blocks = max(2, round(span_m / BLOCK_M))
 
@@ -156,7 +156,7 @@ def _lines_m(rng: np.random.Generator, size_m: float) -> tuple[float, ...]:
 
 
 def _widths_m(rng: np.random.Generator, count: int) -> tuple[float, ...]:
-    """A width for each line: at least one of each kind."""
+    """Draw a width for each line: at least one of each kind."""
     kinds = list(WIDTHS_M.values())
     others = rng.choice(kinds, count - len(kinds), p=(0.25, 0.45, 0.3))
     widths_m = [*kinds, *others.tolist()]
@@ -173,13 +173,13 @@ class _Names:
         self._used: dict[str, int] = {}
 
     def of(self, stretch: Stretch) -> str:
-        """The name of a stretch, such as "Elm Street 2"."""
+        """Return the name of a stretch, such as "Elm Street 2"."""
         width_m = self._grid.width_m(stretch)
         kind = min(WIDTHS_M, key=lambda kind: abs(WIDTHS_M[kind] - width_m))
         return self._numbered(self._grid.line(stretch), kind)
 
     def dead_end(self, number: int) -> str:
-        """The name of a dead end, such as "Rowan Alley 1"."""
+        """Return the name of a dead end, such as "Rowan Alley 1"."""
         lines = len(self._grid.x_m) + len(self._grid.y_m)
         return self._numbered(lines + number, "Alley")
 
@@ -195,8 +195,8 @@ class _Names:
 
 
 def _missing(rng: np.random.Generator, stretches: list[Stretch]) -> list[Stretch]:
-    """Stretches that are not built. Of those that are, any may be closed and all crossings stay
-    reachable.
+    """Choose the stretches that are not built. If any one of the others is closed, all crossings
+    stay reachable.
     """
     most = round(MISSING_SHARE * len(stretches))
     kept = list(stretches)
@@ -216,8 +216,8 @@ def _missing(rng: np.random.Generator, stretches: list[Stretch]) -> list[Stretch
 
 
 def _is_spare(stretch: Stretch, others: list[Stretch]) -> bool:
-    """Whether `others` lead from one end of a stretch to its other end, also with any one of them
-    closed.
+    """Decide whether `others` lead from one end of a stretch to its other end, even if any one of
+    them is closed.
     """
     start, end = stretch
     detour = _route(others, start, end)
@@ -233,7 +233,7 @@ def _is_spare(stretch: Stretch, others: list[Stretch]) -> bool:
 
 
 def _route(stretches: list[Stretch], start: Crossing, end: Crossing) -> list[Stretch]:
-    """The fewest stretches that lead from a crossing to another, none where no way leads there."""
+    """Find the fewest stretches that lead from a crossing to another, none if no way does."""
     leads: dict[Crossing, list[Stretch]] = {}
     for stretch in stretches:
         for crossing in stretch:
@@ -266,7 +266,7 @@ def _other_end(stretch: Stretch, crossing: Crossing) -> Crossing:
 def _dead_ends(
     rng: np.random.Generator, grid: Grid, missing: list[Stretch], names: _Names
 ) -> list[Road]:
-    """Alleys into every other of the missing stretches, and two that lead out of the town."""
+    """Lay alleys into every other of the missing stretches, and two that lead out of the town."""
     roads: list[Road] = []
     for stretch in missing[::2]:
         share = float(rng.uniform(*DEAD_END_SHARE))
@@ -293,7 +293,7 @@ def _dead_ends(
 
 
 def _square(rng: np.random.Generator, grid: Grid) -> Road:
-    """A square around one of the inner crossings: a road that is short and as wide as long."""
+    """Lay a square around one of the inner crossings: a short road that is as wide as long."""
     column = int(rng.integers(1, len(grid.x_m) - 1))
     row = int(rng.integers(1, len(grid.y_m) - 1))
     x_m, y_m = grid.at((column, row))

@@ -26,10 +26,10 @@ class BlocksTown(Place):
 
 
 def generate(seed: int, size_m: float = SIZE_M) -> BlocksTown:
-    """The town of `seed`, about `size_m` to the side: the same every time.
+    """Make the town of `seed`, about `size_m` to the side: the same every time.
 
-    No building is on a street or another; all streets are connected, also with any one closed that
-    is no dead end.
+    No building is on a street or another building. All streets stay connected if any one that is no
+    dead end is closed.
     """
     rng = np.random.default_rng([seed, 0xB10C])
     plan = streets.plan(rng, size_m)

@@ -47,7 +47,7 @@ _LENGTH = re.compile(
 
 
 def is_street(way: Way) -> bool:
-    """Return if cars may drive along a way, in the open and on the ground."""
+    """Decide whether cars may drive along a way, in the open and on the ground."""
     tags = way.tags
     if _kind(tags) not in WIDTHS_M or tags.get("area") == "yes":
         return False
@@ -67,7 +67,7 @@ def width_m(tags: Tags) -> float:
 
 
 def _kind(tags: Tags) -> str:
-    """Return its value of `highway`; a link is of the kind that it leads to."""
+    """Return a way's value of `highway`; a link is of the kind that it leads to."""
     return tags.get("highway", "").removesuffix("_link")
 
 
