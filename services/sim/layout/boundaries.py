@@ -14,9 +14,16 @@ from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.services.sim.layout.plan import Point, Road, corners
 
 CHUNK = 256
-SHORTEST_M = 1e-3
+"""Sides that are compared with all streets at once: their arrays fit into a processor's cache."""
+
+MIN_LENGTH_M = 1e-3
+"""A shorter piece of a kerb is left out: a millimetre, less than any map states."""
+
 _SAME_M = 1e-6
+"""Nearer than this, two points are one: above the rounding of coordinates of a large town."""
+
 _LEVEL_M = 1e-9
+"""Less than this aside, two lines are parallel: above the rounding of their direction."""
 
 
 class Surfaces(NamedTuple):
@@ -147,7 +154,7 @@ def _uncovered(sides: Floats, owners: Indices, streets: Surfaces) -> list[list[f
         is_covered = stops > starts
         start_m = side[:2]
         along_m = side[2:] - start_m
-        shortest = SHORTEST_M / np.hypot(*along_m)
+        shortest = MIN_LENGTH_M / np.hypot(*along_m)
 
         for begin, end in _gaps(starts[is_covered], stops[is_covered], shortest):
             first_m = start_m + begin * along_m

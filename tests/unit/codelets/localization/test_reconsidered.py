@@ -1,4 +1,4 @@
-"""A landmark that does not fit, weighed together with what was seen of late."""
+"""A landmark that does not fit, weighed together with what was seen just before."""
 
 from __future__ import annotations
 
