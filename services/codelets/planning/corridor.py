@@ -28,9 +28,10 @@ from cogmap.services.codelets.sub_maps.coarsening import FACTOR
 MARGIN = 2
 """In cells of a coarse map, unknown places planned over around it."""
 
+# How far from a route within a sub-map places are planned on: so many of its cells, as its grid is
+# turned against the root map's, and half a street's width.
 BESIDE_CELLS = 1.5
 BESIDE_M = 4.0
-"""How far from a route within a sub-map places are planned on: so many of its cells and metres."""
 
 
 class Corridor(NamedTuple):

@@ -42,15 +42,18 @@ BLIND_M = 4.5
 """Ahead of the agent, up to which its camera sees no ground: by the camera's height and angle."""
 
 BLIND_STEP_M = 0.5
+"""Between points of the blind ground: less than a place."""
+
 ROAD_BEYOND_M = 2.0
+"""Behind the blind ground, where road must begin for it to be known: two places."""
 
 NEAR_M = 6.0
 """From so near the agent sees for sure whether blocked road is free again."""
 
+# So far ahead, and to each side of that line, an agent looks at the ground: less than the scan
+# reaches, in a street's width.
 LOOK_M = 20.0
 LOOK_BESIDE_M = 4.0
-"""So far ahead, and to each side of that line, an agent looks at the ground: less than the scan
-reaches, in a street's width."""
 
 LOOK_TAKES_S = 10.0
 """While the agent looks for so long it does not know yet whether what was there has gone."""
