@@ -15,6 +15,7 @@ from cogmap.services.codelets.config import Config
 
 __all__ = ["Config", "Worker", "build"]
 
+# A bound on tasks that wait: other workers do most of them, and deltas drop what is done.
 MAX_WAITING = 1024
 
 

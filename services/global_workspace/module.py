@@ -31,6 +31,7 @@ from cogmap.services.global_workspace.config import (
 
 __all__ = ["Config", "GlobalWorkspace", "build"]
 
+# A bound: coalitions that come twice, for a worker was lost, do so within moments.
 REMEMBERED_CYCLES = 64
 
 

@@ -15,6 +15,7 @@ from cogmap.schemas.graph import Cells, Delta, Links, Operation, Phase, Snapshot
 from cogmap.schemas.nodes import KINDS, ROOT_MAP, LinkKind, Map
 from cogmap.services.workspace.rules import Key, Writer, check_operation, written_by
 
+# Stated in a delta, so that a worker that fails all the time does not make deltas large.
 MAX_REASONS = 8
 MAX_REASON_CHARACTERS = 200
 

@@ -39,6 +39,7 @@ WORKERS = "codelets"
 COMPETITION = "global_workspace"
 OFFERING = ("memory", "motor")
 """The modules that make an offer in each cycle of lockstep, perhaps of nothing."""
+# Tasks of cycles before whose answers are still taken: a bound, for some are never answered.
 MAX_LATE_TASKS = 256
 PHASES = (Phase.CORRECTION, Phase.LOCALIZATION, Phase.OBJECTS, Phase.ATTENTION)
 LANES_BEGIN = Phase.ATTENTION

@@ -11,6 +11,7 @@ import msgspec
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
 
+# More tasks than a phase has.
 BUSY = 1000
 MAX_ATTEMPTS = 5
 """Workers that a task is given to before it has failed: one that kills each must end."""

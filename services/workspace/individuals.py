@@ -32,6 +32,8 @@ ESTABLISHED = 3
 """An object that was seen so often stands where it is."""
 
 MAX_INDIVIDUALS = 64
+"""Objects that look alike, at most, for each percept is compared with all of them."""
+
 NOT_ELSEWHERE_NS = 20_000_000_000
 """For so long it holds that the agent can be nowhere else; chosen, not tuned."""
 

@@ -39,6 +39,8 @@ Key = str | tuple[str, int, int, str]
 Writer = Callable[[object], bool]
 """Whether a writer may write a kind of nodes (a type), a kind of links, or a place column."""
 
+# Bounds on what one mistaken answer can cost: cells of 0.8 MB in a message, tiles in memory (cells
+# that are far apart make one each), and no cell farther than 1,000 km at 1 m.
 MAX_CELLS = 2**16
 MAX_TILES = 1024
 FARTHEST_CELL = 2**20

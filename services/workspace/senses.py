@@ -13,7 +13,9 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.nodes import ENERGY, Need, need_id
 from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
 
+# Speed, turn rate, duration, and the standard deviations of the two speeds.
 SELF_MOTION_COLUMNS = 5
+# Bounds: those of the last three seconds, at five views a second.
 MAX_SCANS = 16
 MAX_ENERGIES = 16
 MAX_SCAN_AGE_NS = 100_000_000

@@ -25,6 +25,7 @@ from cogmap.services.codelets.nodes import nodes_of
 
 NAME = "danger"
 AHEAD = "ahead"
+# Salience is from -1, bad, to 1: nothing is more salient.
 BAD = -1.0
 # Little more than the distance at which the robot is stopped.
 NEAREST_M = CLEARANCE_M + 0.4

@@ -49,11 +49,12 @@ from cogmap.services.codelets.nodes import nodes_of
 
 NAME = "expectation"
 SECTION = NAME
+# Salience is from -1, bad, to 1: nothing is more salient.
 SURPRISE = -1.0
 # Views are counted anew once the agent was so many times as far away as it can see them.
 AWAY = 2.0
-# What is found near where a street was blocked is the same blockage for so many cycles. It counts
-# once it was seen in two views that are no farther apart.
+# What is found near where a street was blocked is the same blockage for so many cycles, ten
+# minutes. It counts once it was seen in two views that are no farther apart.
 SAME_CYCLES = 3000
 GLIMPSE_CYCLES = 3
 

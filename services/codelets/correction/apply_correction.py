@@ -41,6 +41,7 @@ from cogmap.services.codelets.mapping.path import POSE, STAMP, with_rows
 OLD = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_HEADING_RAD + 1)
 NEW = slice(CorrectionColumn.NEW_X_M, CorrectionColumn.NEW_HEADING_RAD + 1)
 OLD_POSITION = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_Y_M + 1)
+# Places of the path so much farther than the nearest are still of the same passing by.
 BESIDE_M = 10.0
 
 

@@ -15,11 +15,13 @@ from cogmap.geometry.se2 import compose, relative, wrap_angle
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.mapping.path import JOINED, LAST, POSE, STAMP, steps_of
 
+# A place is the same within twice the path's spacing, headed alike to 22 degrees.
 SAME_M = 2.0
 SAME_RAD = np.pi / 8
 # The error of a place's pose, seen from the place that it is joined to.
 JOIN_SD_M = 0.2
 JOIN_SD_RAD = 0.02
+# In standard deviations of a pose: of true steps one in 65,000 errs by more.
 IMPOSSIBLE_SD = 5.0
 STAYS = -1
 

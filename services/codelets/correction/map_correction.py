@@ -54,10 +54,14 @@ from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import POSE, STAMP, joins_of, steps_of
 from cogmap.services.codelets.mapping.views import constraints_of, views_of
 
+# Places of the path, 1 m apart, that a loop has at least.
 MIN_ROWS = 10
+# In standard deviations of a pose: of true steps one in 65,000 errs by more.
 IMPOSSIBLE_SD = 5.0
+# At most so many times constraints are computed anew, until headings turn by less (3 degrees).
 MAX_ROUNDS = 3
 SAME_RAD = 0.05
+# A path of so many segments, half a kilometre, is corrected as often as closures come.
 SHORT_SEGMENTS = 8
 # A loop closure is rejected if a true one would misfit as much with a smaller probability.
 FALSE_CLOSURE = 1e-3

@@ -23,6 +23,7 @@ SHARE_COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE)
 MOVED_COLUMNS = (*SHARE_COLUMNS, *EVIDENCE_COLUMNS, *WEIGHT_COLUMNS)
 NEIGHBOURHOOD = np.array([(i, j) for i in (-1, 0, 1) for j in (-1, 0, 1)])
 OCTANT_RAD = np.pi / 4
+# More than there are cells along an axis: the workspace takes none beyond 2^20.
 _KEY_STEP = 2**32
 _DIRECTIONS = len(LINK_OFFSETS)
 

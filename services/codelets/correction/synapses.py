@@ -12,7 +12,8 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.cognition import Replay
 from cogmap.services.codelets.mapping.path import POSE, STAMP
 
-# How fast the synapse between two place cells decays with the distance of their fields.
+# How fast the synapse between two place cells decays with the distance of their fields: k of
+# S = exp(-k d), for which the paper has no value.
 DECAY_PER_M = 0.2
 
 

@@ -70,6 +70,7 @@ STAGES = 3
 # radian, may be any.
 TURNED_RAD = 1.0
 ALIKE = 0.6
+# After so long without another misfit, those before say nothing of where the agent is now.
 FORGOTTEN_NS = 20_000_000_000
 
 

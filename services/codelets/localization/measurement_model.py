@@ -18,12 +18,13 @@ from cogmap.services.codelets.localization.motion_model import RANGE
 
 # A landmark informs that is known to this share of its distance.
 MAX_SD_SHARE = 0.5
+# One sighting may have had another's name.
 MIN_SIGHTINGS = 2
 # The distance up to which a landmark may stand that is seen by its bearing alone: no building is
 # recognised from farther.
 FARTHEST_M = 50.0
 # A percept farther from what a sample predicts does not fit it, in standard deviations: of normal
-# errors one in 16,000 is.
+# errors one in 3,000 is in bearing and range, one in 16,000 in one of them alone.
 GATE = 4.0
 # The share of percepts that may be of another landmark: names that are as good as sure.
 OUTLIER_SHARE = 1e-3

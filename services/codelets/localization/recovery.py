@@ -25,10 +25,12 @@ from cogmap.services.codelets.localization.sampling import position_sd_m
 from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import ODOMETRY, STAMP, objects_along
 
+# Tried for each sample that is drawn.
 CANDIDATES = 16
 # A pose is accepted that so many landmarks fit, and such a share of those in view.
 MIN_FITTING = 2
 FITTING_SHARE = 2 / 3
+# A landmark counts as a whole whose position has at most this standard deviation.
 SURE_M = 1.0
 # The error of path integration since a landmark was seen, as a share of the distance.
 DRIFT_SHARE = 0.05

@@ -11,9 +11,11 @@ from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import FULL_TURN_RAD, mean_pose, wrap_angle
 
 Samples = Floats
+# Near enough: where 0.25 of samples with normal errors are to be kept, 0.18 to 0.25 are.
 SECANT_STEPS = 4
 # Added when samples are inflated, which may all be the same: metres, metres, radians.
 INFLATION_SD = np.array([0.02, 0.02, 0.01])
+# A bound below 1 for a single effective sample; of two or more the kernel is narrower.
 MAX_KERNEL_VARIANCE = 0.9
 
 

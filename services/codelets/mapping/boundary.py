@@ -22,12 +22,15 @@ from cogmap.services.codelets.mapping.evidence import accumulated, blended, weig
 from cogmap.services.codelets.mapping.local_grid import LocalGrid
 from cogmap.services.codelets.mapping.rays import clear_cells, rays_of
 
-# The distance up to which links are cut or freed by what is seen.
+# The distance up to which links are cut or freed by what is seen: from 35 m the precision of
+# boundaries fell from 0.94 to 0.82 in a town of the benchmark `explore`.
 REACH_M = 25.0
 # In cells, from the middle of one along both axes: road there is road at the place node, and an
 # edge there is right beside it.
 ROAD_WITHIN = 0.35
 BESIDE_WITHIN = 0.2
+# Ground is of one kind if it differs by less, from 0 to 1 for road. A ray between two place nodes
+# counts half as much as road at both, for it passes over kerbs.
 ROAD_STEP = 0.25
 RAY_CERTAINTY = 0.5
 WRITTEN = (*EVIDENCE_COLUMNS, *WEIGHT_COLUMNS, PlaceColumn.OBSTACLE)

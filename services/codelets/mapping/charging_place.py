@@ -26,7 +26,9 @@ from cogmap.schemas.nodes import (
 LOOK = "charging-place"
 # From as near, the one that is known charges as well.
 SAME_M = 8.0
+# The standard deviation of how far it stands from the agent that it charges.
 SD_M = 2.0
+# A bound on the labels that are tried.
 MAX_PLACES = 64
 
 

@@ -8,11 +8,14 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats, Singles
 
+# Of links: two sure views cut one that is unknown, four one that was free for long. A free view
+# counts half as much: six sure ones free what was cut.
 CUT_AT = 2.0
 MAX_CUT = 3.0
 MAX_FREE = 2.0
 CUT_GAIN = 1.0
 FREE_GAIN = 0.5
+# Of cells: each sure view counts as much as all before it; four that see nothing leave nothing.
 CELL_GAIN = 0.5
 FORGOTTEN_BELOW = 0.1
 # A smaller change is not worth the bytes of writing it.

@@ -15,9 +15,10 @@ from cogmap.schemas.graph import Operation
 from cogmap.schemas.nodes import PlaceColumn, Self
 from cogmap.services.codelets.cells import changed_cells
 
+# Beyond the reach: one for rounding, and one for links that lead there.
 MARGIN_CELLS = 2
 # The standard deviation of a distance seen over the distance, by which road, boundaries and
-# obstacles far away count less.
+# obstacles far away count less: the paper's noise of distances (§6).
 RANGE_SD_SHARE = 0.03
 
 

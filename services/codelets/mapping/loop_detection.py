@@ -35,6 +35,7 @@ from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import ODOMETRY, STAMP, path_grows
 from cogmap.services.codelets.nodes import nodes_of
 
+# Observations of a landmark on one pass agree if they place it at most so far apart.
 SAME_M = 6.0
 PLACE_CUE = ""
 

@@ -27,9 +27,13 @@ DIRECTION = ObservationColumn.DIRECTION_RAD
 # An observation that deviates by this many standard deviations counts half as much as one that
 # fits: it may be of another landmark.
 DOUBTED = 2.0
+# Times that observations are weighed anew.
 ROUNDS = 6
+# In rad^-2: a landmark has no heading, but the least squares need some information on each.
 NO_HEADING = 1e-6
+# Less than any sense is exact to: weights stay finite.
 MIN_SD_M = 1e-3
+# More than a stamp in s is rounded by, less than the time between two places.
 SAME_PLACE_S = 1e-6
 
 

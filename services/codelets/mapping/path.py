@@ -37,6 +37,7 @@ from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.mapping.observations import Viewpoint, extended, is_observed_from
 from cogmap.services.codelets.nodes import nodes_of
 
+# Places in a segment. It is written anew with each of them, so it is kept to 6 KB.
 ROWS = 64
 COLUMNS = len(PathColumn)
 STAMP = PathColumn.STAMP_S

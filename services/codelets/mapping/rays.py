@@ -11,10 +11,13 @@ from cogmap.geometry.se2 import rotate
 from cogmap.schemas.array import Array
 from cogmap.services.codelets.mapping.local_grid import RANGE_SD_SHARE, LocalGrid
 
+# In cells: two points a cell miss none that a ray passes by more than a corner.
 STEP = 0.5
+# What a ray hits is taken to be at least so wide.
 MIN_WIDTH_M = 0.3
 # Farther away a ray that grazes a wall may seem to pass through it.
 CLEAR_M = 15.0
+# Hits of successive rays are of one wall if no more than this and a share of the range apart.
 MAX_GAP_M = 1.0
 MAX_GAP_SHARE = 0.05
 # So many points of the road, so far behind what a ray hits, show that nothing stands there.

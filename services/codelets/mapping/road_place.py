@@ -20,7 +20,9 @@ from cogmap.services.codelets.mapping.evidence import blended
 from cogmap.services.codelets.mapping.local_grid import LocalGrid
 from cogmap.services.codelets.mapping.rays import clear_cells, rays_of
 
+# Less than the 15 m up to which perception sees road.
 ROAD_REACH_M = 12.0
+# A place node, 1 m wide, has about four points at most: perception has one in each 0.5 m.
 ENOUGH_POINTS = 3
 # Nearer ground is below the image, and of farther ground too few points are seen to miss any.
 NOT_ROAD_M = (3.0, 8.0)

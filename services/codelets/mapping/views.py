@@ -11,6 +11,7 @@ from cogmap.geometry.se2 import relative, rotation_matrices
 from cogmap.schemas.nodes import LoopClosure
 from cogmap.services.codelets.mapping.path import STAMP
 
+# Less than any sense is exact to: weights stay finite.
 MIN_SD_M = 1e-3
 
 

@@ -11,6 +11,7 @@ from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import ROOT_MAP, Map, Object, map_id
 from cogmap.services.codelets.sub_maps.members import positions_of
 
+# Of a sub-map with one object, or with objects in a row: a cell of the root map.
 MIN_SIDE_M = 1.0
 # A sub-map is sorted anew when its objects have moved its border by more.
 MOVED_M = 5.0

@@ -30,6 +30,7 @@ from cogmap.services.codelets.sub_maps.coarsening import (
 EVERY_CYCLES = 5
 # The distance from the agent within which the root map changes as it looks around.
 REACH_M = 30.0
+# Three levels with the root map, as the planner by the paper's first author has (§5.5).
 LEVELS = 2
 CELLS = FACTOR**LEVELS
 """The cells of the root map along the side of the coarsest map's cell."""

@@ -12,6 +12,7 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Singles
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, OBSTACLE_FROM
 
+# That of the planner by the paper's first author (§5.5).
 FACTOR = 3
 MARGIN = FACTOR
 """Of the finer cells, so many more are needed on each side."""

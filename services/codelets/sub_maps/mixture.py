@@ -30,6 +30,8 @@ from scipy.special import gammaln
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.services.codelets.sub_maps.config import Config
 
+# The model was developed on made-up towns (benchmarks/map_structure/towns.py), of other seeds than
+# the benchmark's.
 # The extent of a sub-map before any object is known: the standard deviation of its objects'
 # positions.
 SUB_MAP_SD_M = 50.0
@@ -44,6 +46,8 @@ SCATTER_PRIOR_COUNT = 4.0
 SPACING_MEAN_PRIOR_COUNT = 0.01
 SPACING_PRIOR_COUNT = 4.0
 SPACING_PRIOR_SD = 0.25
+# A gap counts from twice the spacing on: the logarithm of a normal density with this standard
+# deviation in the logarithm of the gap, down to a bound, as one gap is not to outweigh all else.
 USUAL_GAP = math.log(2.0)
 GAP_SD = 0.35
 MIN_GAP_BOND = -10.0

@@ -9,7 +9,9 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.services.codelets.sub_maps.neighbours import comes_between, neighbours, neighbours_of
 
+# What a neighbour across a boundary counts for: hardly anything, unless there are no others.
 CROSSED_SHARE = 0.01
+# In units: of two objects at one place the logarithm stays finite.
 MIN_SPACING = 0.01
 
 

@@ -11,7 +11,9 @@ from cogmap.geometry.arrays import Booleans, Floats, Indices
 
 NEAREST = 20
 """Among so many nearest objects neighbours are sought; hardly any has one that is farther."""
+# Objects at a time: their products of NEAREST x NEAREST take 7 MB.
 CHUNK = 2048
+# A share of the squared distance, more than rounding errors: an object on the circle is not inside.
 ROUNDING = 1e-9
 
 

@@ -27,6 +27,7 @@ BESIDE = 2
 """Cells around a rectangle that its links lead to or past."""
 
 ROUNDING = 1e-6
+"""In cells: more than rounding errors, less than matters to a place."""
 
 
 class Grid(NamedTuple):
@@ -203,5 +204,6 @@ def _links_by_step() -> tuple[Indices, Booleans]:
     return link, is_back
 
 
+# The code of a step that stays in one place: 1 as it, along both axes, so 3 * 1 + 1.
 _STILL = 4
 _LINK, _IS_BACK = _links_by_step()

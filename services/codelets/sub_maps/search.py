@@ -14,9 +14,12 @@ from cogmap.services.codelets.sub_maps.merging import Merging
 from cogmap.services.codelets.sub_maps.mixture import Mixture, Scene
 from cogmap.services.codelets.sub_maps.moves import best_moves, gain_most
 
+# A bound: as each step raises the probability, sweeps end by themselves, and so do rounds.
 MAX_SWEEPS = 50
+# By how many times there are fewer pieces at each level.
 PIECES_A_LEVEL = 4
 MAX_ROUNDS = 8
+# Of the logarithm of the probability: more than rounding errors.
 MIN_GAIN = 1e-6
 
 
@@ -99,7 +102,7 @@ def move_pieces(mixture: Mixture, scene: Scene, labels: Indices) -> Indices:
     """Move pieces of clusters to neighbouring ones as long as that raises the probability: large
     pieces first, then smaller ones, then single objects.
 
-    Pieces are what the objects of a cluster merge to, a tenth as many at each level.
+    Pieces are what the objects of a cluster merge to, a quarter as many at each level.
     """
     within = scene.within(labels)
     levels = [np.arange(len(labels))]
