@@ -15,10 +15,13 @@ from cogmap.services.motor.config import Config
 from cogmap.services.motor.parameters import Parameters, number, stamp
 from cogmap.services.motor.route import Route, pursuit
 
+# A bound on memory: 13 s at 5 views a second.
 TRACKED_POSES = 64
+# A shorter path counts as driven: procedural memory's THERE_M is as long.
 SHORT_M = 2.0
 # Distance from the end of a path at which it stops; chosen, not tuned.
 END_M = 0.5
+# Paths that differ more in direction lead elsewhere.
 TURNED_RAD = 1.0
 
 

@@ -15,10 +15,15 @@ from cogmap.services.motor.aim import Aim, Speed, in_bend, slowest
 from cogmap.services.motor.config import Config
 from cogmap.services.motor.reactive.near import NearObstacles
 
+# What is farther aside is not in front.
 MAX_BEARING_RAD = math.pi / 3
+# Of each wheel in a turn on the spot, at most.
 TURNING_SPEED_M_S = 0.5
+# The robot turns on the spot if its aim is farther aside than the first, or, before an obstacle,
+# than the second: else it would drive circles that leave a narrow street.
 BEHIND_RAD = 1.0
 ASIDE_RAD = 0.3
+# At the end of a turn the rest of it would take so long: it ends slowly.
 TURN_TIME_S = 0.5
 
 

@@ -17,6 +17,7 @@ from cogmap.services.motor.guide import Guide, Track
 from cogmap.services.motor.parameters import Parameters, number, word
 from cogmap.services.motor.route import Route, pursuit
 
+# A turn is complete when so little is left: 3 degrees.
 TURNED_RAD = 0.05
 # Chosen, not tuned: slow, and some two errors of a pose in the town (0.2 m) from the target.
 DOCK_M_S = 0.5

@@ -12,8 +12,11 @@ from cogmap.schemas.sensing import Pose, SpeedLimit
 from cogmap.services.motor.aim import Aim, Speed, bearing_of, in_bend, slowest
 from cogmap.services.motor.config import Config
 
+# Between the points of a line: a quarter of a place.
 STEP_M = 0.25
+# The agent is looked for so far ahead on the line: more than it drives from view to view (0.8 m).
 SEARCH_M = 6.0
+# Three places: a line over a grid goes in steps of one.
 SMOOTHED_M = 3.0
 LOOKAHEAD_M = 2.5
 """Distance of the point that pure pursuit steers to: 0.6 s at cruising speed."""

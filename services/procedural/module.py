@@ -23,6 +23,7 @@ from cogmap.services.procedural.situations import Situations
 
 __all__ = ["Config", "ProceduralMemory", "build"]
 
+# In lockstep no cycle begins so much later before the action was published: else that is lost.
 GIVEN_UP_CYCLES = 2
 
 

@@ -12,6 +12,7 @@ from cogmap.schemas.nodes import KINDS, GraphNode, kind_name
 from cogmap.services.procedural.patterns import Active
 
 BEFORE_POSE = frozenset({Phase.PERCEPTS, Phase.CORRECTION})
+# A bound on memory: 13 s at five cycles a second.
 REMEMBERED_CYCLES = 64
 
 

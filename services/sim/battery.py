@@ -14,6 +14,7 @@ from cogmap.schemas.base import Message, PositiveMetres, PositiveSeconds, Share
 from cogmap.schemas.sensing import Energy, Pose
 from cogmap.services.sim.layout.plan import Point
 
+# A robot that is slower stands, and may be charged.
 STANDS_M_S = 0.05
 
 

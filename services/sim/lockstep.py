@@ -6,6 +6,7 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import MotorCommand
 from cogmap.services.sim.simulation import Simulation
 
+# How often the wait for a command is looked at: a tenth of REPEAT_AFTER_NS.
 REPEAT_CHECK_NS = 1_000_000_000
 
 REPEAT_AFTER_NS = 10_000_000_000

@@ -9,7 +9,9 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import MotorCommand
 from cogmap.services.sim.simulation import Simulation
 
+# At most so much is caught up at once: five ticks of the odometry.
 CATCH_UP_NS = 250_000_000
+# How often the town is published, for those who join later; the time that the rate is of.
 TOWN_PERIOD_NS = 5_000_000_000
 RATE_WINDOW_NS = 1_000_000_000
 

@@ -8,6 +8,8 @@ from cogmap.robot import MAX_WHEEL_RAD_S, TRACK_M, WHEEL_RADIUS_M
 from cogmap.schemas.sensing import Pose
 from cogmap.services.sim.stdio import pybullet
 
+# A made-up robot: 35 kg, which its motors speed up by 5.7 m/s2. The grip of its wheels is more than
+# twice what that takes, so that they do not slip.
 _MASS_KG = 30.0
 _WHEEL_KG = 2.0
 _CASTER_KG = 0.5

@@ -15,6 +15,7 @@ from cogmap.schemas.base import Coordinate, Name, PositiveMetres, PositiveSpeed
 from cogmap.schemas.sensing import Pose
 
 Leg = tuple[float, float]
+# Nearer than this, two points are one: above the rounding of coordinates.
 SAME_POINT_M = 1e-6
 
 

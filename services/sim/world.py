@@ -33,6 +33,7 @@ _GRAVITY_M_S2 = -9.81
 _CONTACT_BODY = 2
 # A collision is over where the robot has moved so far from it.
 _RELEASED_M = 0.3
+# Side of a square whose streets are shown and hidden together.
 _TILE_M = 64.0
 _log = logging.getLogger(__name__)
 

@@ -7,6 +7,7 @@ import msgspec
 from cogmap.robot import WHEEL_RADIUS_M
 from cogmap.schemas.sensing import MotorCommand, SpeedLimit
 
+# How long the robot waits before an obstacle; how long and fast it backs away, 0.8 m in all.
 HALTED_S = 2.0
 BACK_S = 2.0
 BACK_M_S = 0.4

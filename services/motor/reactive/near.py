@@ -15,6 +15,7 @@ from cogmap.geometry.se2 import moved_by, transform_to
 from cogmap.robot import NEAREST_SCAN_M
 from cogmap.schemas.sensing import RangeScan, SelfMotion
 
+# Hits are kept until they are so far behind the robot, so old, or so far away.
 REMEMBERED_M = 6.0
 REMEMBERED_S = 20.0
 FARTHEST_M = 12.0
@@ -27,8 +28,11 @@ STILL_RAD = 0.01
 STILL_SCANS = 2 * MIN_SCANS
 # What is nearer than the scan has ranges for, and was not seen before, may be at any of these.
 TOO_NEAR_M = np.array([1.2, 1.8, 2.4])
+# A direction that is so near to that of a hit is not new: almost four rays of the scan.
 SAME_RAD = 0.15
+# What is seen so much farther away is another surface.
 BEHIND_M = 1.0
+# Of the arcs that are tried: their length, between their points, and curvatures, up to 1 m radius.
 ARC_M = 2.0
 STEP_M = 0.25
 CURVATURES_PER_M = np.linspace(-1.0, 1.0, 21)

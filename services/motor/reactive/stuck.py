@@ -7,6 +7,8 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.schemas.sensing import SelfMotion
 
+# A slower robot stands. It is stuck only if it is commanded to drive three times as fast as that,
+# and does not turn on the spot either.
 STUCK_M_S = 0.1
 MIN_COMMANDED_M_S = 3 * STUCK_M_S
 MIN_TURN_RAD_S = 0.05

@@ -14,6 +14,8 @@ import numpy as np
 from cogmap.estimation.alignment import motion_onto
 from cogmap.schemas.cognition import Relation
 
+# Errors of a landmark between two views: when near, and as a share of its range, about 1.4 times
+# the 2.5 % of one view. And of the turn between them: along one route it is small.
 NEAR_SD_M = 0.3
 RANGE_SD_SHARE = 0.04
 PRIOR_SD_RAD = 0.3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+# Twice the time that 40 m (AHEAD_M) take at cruising speed; and how near to its end counts.
 WITHIN_NS = 20_000_000_000
 THERE_M = 2.0
 

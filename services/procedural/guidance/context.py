@@ -10,10 +10,14 @@ from cogmap.schemas.base import Scalar
 from cogmap.schemas.cognition import ActionName, Behaviour, GuidanceScheme, Relation
 from cogmap.services.procedural.guidance.alignment import Motion, aligned, pairs_of
 
+# So far from where it was learned, or turned so far, a scheme is half as active.
 HALF_AWAY_M = 4.0
 HALF_TURNED_RAD = 0.5
+# Nothing is known yet: as likely a success as not.
 UNTRIED = 0.5
+# How much it counts to come to the end of a path, as in the adding list of a scheme.
 SALIENCE = 0.3
+# Fewer landmarks count as so many, the others missing.
 MIN_LANDMARKS = 3
 SEEN_NS = "seen_ns"
 RESULT = "self at the end of the path"

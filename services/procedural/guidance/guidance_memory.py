@@ -14,7 +14,9 @@ from cogmap.services.procedural.guidance.context import SEEN_NS, end_of, fit
 from cogmap.services.procedural.guidance.lessons import AHEAD_M, STEP_M, Lessons, Place
 from cogmap.services.procedural.patterns import Active
 
+# A bound on memory: 13 s at five views a second.
 REMEMBERED_PLACES = 64
+# With less, one landmark among many that were missing led the robot astray at the end of its route.
 MIN_FIT = 0.25
 DRIVING = frozenset({ActionName.FOLLOW_PLAN, ActionName.SEEK})
 NAME = "guide_{}"

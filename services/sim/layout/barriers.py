@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from cogmap.services.sim.layout.furniture import Prop
 from cogmap.services.sim.layout.plan import PAVEMENT_WIDTH_M, Road
 
+# Made up; the camera, at 1.5 m, sees over it.
 THICKNESS_M = 0.4
 HEIGHT_M = 1.2
 

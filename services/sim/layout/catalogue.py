@@ -182,6 +182,7 @@ _PATTERNS = (
     "shutters",
 )
 _FINISHES = (_WHITE, _CREAM, _STONE, _DARK)
+# Of 255 levels of red, green or blue: a pattern is to be seen on its wall.
 MIN_CONTRAST = 80
 _ROOFS = (_TILE, _SLATE, _COPPER, _THATCH, _DARK)
 

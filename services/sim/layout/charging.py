@@ -20,14 +20,18 @@ from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Point, Road
 
 SIZE_M = (0.6, 0.6, 2.6)
+# From the kerb, as other props at least.
 KERB_GAP_M = 0.15
 # From the end of a street, where others may cross it.
 JUNCTION_M = 8.0
+# From any wall at least.
 WALL_M = 1.0
 # Objects that stand nearer to one another than buildings are taken for one.
 BUILDING_M = APART_M + 0.5
+# From props, and from other posts at least.
 PROP_M = 3.5
 POST_M = 15.0
+# Of a random search: posts that are tried, and choices of them, of which the best is kept.
 CANDIDATES = 1000
 DRAWS = 200
 # From where the robot starts, less than the distance at which it is charged.

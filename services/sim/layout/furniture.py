@@ -21,6 +21,8 @@ from cogmap.services.sim.layout.plan import (
 Size = tuple[float, float, float]
 
 CHARGING_PLACE = "charging-place"
+# Made up: about how far props are apart along a street; how many stand elsewhere, and how far from
+# the middle; gaps to the kerb, and to all else.
 _SPACING_M = 5.0
 _SCATTERED = 30
 _AROUND_M = 55.0

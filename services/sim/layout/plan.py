@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 from cogmap.services.sim.layout.catalogue import BuildingType
 
+# As wide as a `tertiary` road of OpenStreetMap, and a made-up pavement on each side.
 STREET_WIDTH_M = 8.0
 PAVEMENT_WIDTH_M = 2.0
+# Less than this aside, a road runs along an axis: above the rounding of coordinates.
 LEVEL_M = 1e-6
 
 Point = tuple[float, float]

@@ -15,6 +15,7 @@ from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Plot, Point, Road
 from cogmap.services.sim.trajectory import Line, Trajectory
 
+# From the line to a building's front: more than HALF_WIDTH_M of the robot.
 CLEAR_M = 1.0
 _KINDS = {kind.name: kind for kind in CATALOGUE}
 

@@ -12,6 +12,7 @@ from cogmap.services.sim.layout.furniture import Prop
 from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Point, Road
 
+# From a start to props and to the ends of its street; between the places that are tried.
 CLEAR_M = 8.0
 STEP_M = 1.0
 

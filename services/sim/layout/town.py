@@ -23,8 +23,10 @@ from cogmap.services.sim.layout.plan import (
     overlap,
 )
 
+# Of the catalogue's 24 kinds; and how many kinds are tried where one is to be built.
 MIN_BUILDINGS = 21
 CANDIDATES = 6
+# Least gaps from a building to a pavement, and to another building.
 STREET_GAP_M = 0.2
 BUILDING_GAP_M = 1.0
 _REACH_M = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M

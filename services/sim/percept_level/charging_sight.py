@@ -22,6 +22,7 @@ FARTHEST_M = 30.0
 MIN_SHARE = 0.5
 """A post is seen if walls hide less than the rest of its width."""
 
+# It is whole if so large a part of its width is seen, as a building is (town_sensors.py).
 WHOLE_SHARE = 0.9
 _STREAM = 0xC5
 

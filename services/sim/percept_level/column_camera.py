@@ -16,8 +16,10 @@ from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import transform_to
 from cogmap.schemas.sensing import Calibration
 
+# What is nearer is cut off: the robot's body keeps 0.3 m before its camera.
 NEAR_M = 0.05
 NOTHING = -1
+# Below this, a line leads through the camera or runs across its axis: above rounding.
 _EDGE_ON_M = 1e-9
 
 

@@ -13,8 +13,10 @@ from cogmap.geometry.se2 import rotate
 from cogmap.services.sim.layout.boundaries import Surfaces
 from cogmap.services.sim.percept_level.column_camera import ColumnCamera
 
+# As EPAM has them (services/epam/layout/ground.py), BESIDE_PX and BORDER_PX too.
 MAX_RANGE_M = 15.0
 CELL_M = 0.5
+# Along each side of a cell: points are 0.25 m apart.
 POINTS_A_CELL = 2
 # A boundary is claimed if so many columns on both sides of a point show nothing nearer.
 BESIDE_PX = 4

@@ -15,6 +15,7 @@ from cogmap.services.sim.percept_level.senses import View
 from cogmap.services.sim.trajectory import Trajectory
 
 ROAD_AHEAD_M = (0.0, 3.0, 6.0, 9.0)
+# From the line to the houses beside it; between the points of a line of sight that are checked.
 STREET_HALF_WIDTH_M = 12.0
 SIGHT_STEP_M = 4.0
 _NOTHING = np.zeros(0, np.float32)

@@ -25,9 +25,12 @@ from cogmap.schemas.base import (
 from cogmap.schemas.sensing import Percept, Pose
 from cogmap.services.sim.trajectory import Landmark
 
+# Mathematics: half of all normal errors are less than so many standard deviations.
 NORMAL_MEDIAN = 0.6745
+# A message has ranges and standard deviations above 0, whatever noise is drawn or set.
 MIN_RANGE_M = 0.1
 MIN_RANGE_SD_M = 1e-3
+# Seeds a stream of random numbers: any number that no other stream has.
 BUILDINGS = 0x9E
 
 

@@ -7,8 +7,10 @@ import numpy as np
 from cogmap.schemas.sensing import PlaceMatch, Pose
 from cogmap.services.sim.percept_level.percepts import PerceptErrors
 
+# Views within this are of one place (`benchmarks perception`: 3 m and 30 degrees, here 20).
 MAX_APART_M = 3.0
 MAX_TURN_RAD = 0.35
+# From which view on a place is recognized; so many last views do not match.
 SEQUENCE_FRAMES = 4
 RECENT_FRAMES = 20
 

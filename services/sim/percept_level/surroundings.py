@@ -13,10 +13,12 @@ from cogmap.services.sim.layout.barriers import barriers
 from cogmap.services.sim.layout.boundaries import Surfaces, outlines, points_along, surfaces
 from cogmap.services.sim.layout.place import Place
 
+# For the ground a metre beyond MAX_RANGE_M (ground.py); for bodies well beyond the robot's radius.
 GROUND_REACH_M = 16.0
 BODY_REACH_M = 2.0
 # How far the robot moves before what is near it is chosen again.
 MOVED_M = 8.0
+# Between points along a kerb: five in a cell of the ground.
 KERB_STEP_M = 0.1
 
 

@@ -17,6 +17,7 @@ from cogmap.services.sim.rendering.wall import Image
 from cogmap.services.sim.stdio import pybullet, quiet
 from cogmap.services.sim.world import World
 
+# Images show no more: as near as the body lets anything come, and beyond the ground's corners.
 NEAR_M = 0.2
 FAR_M = 400.0
 _NOON = (-0.4, -0.7, 1.0)

@@ -18,6 +18,7 @@ plugin = importlib.util.find_spec("eglRenderer").origin
 if pybullet.loadPlugin(plugin, "_eglRendererPlugin") >= 0:
     os.write(int(sys.argv[1]), b"1")
 """
+# A bound for a driver that hangs: the plugin then counts as one that does not work.
 _PROBE_S = 20.0
 
 

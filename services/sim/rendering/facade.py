@@ -13,6 +13,7 @@ from cogmap.services.sim.rendering.patterns import PAINT, STOREY_M
 from cogmap.services.sim.rendering.wall import PX_PER_M, Image, Wall, roughen, shaded
 
 _GLASS: Colour = (58, 74, 96)
+# Looks alone, but EPAM's networks were trained on buildings that look so.
 _PLINTH_M = 0.5
 _BAY_M = 2.6
 _SILL_M = 1.0

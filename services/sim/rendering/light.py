@@ -14,8 +14,10 @@ from cogmap.services.sim.rendering.wall import Image
 
 Box = tuple[Rectangle, float]
 
+# The relief is a square of 200 m around the middle: a town of one loop is smaller.
 _CELL_M = 0.5
 _CELLS = 400
+# So far before a surface its shadow is looked up: more than a cell.
 _CLEAR_M = 0.6
 _PENUMBRA_PX = (5, 5)
 

@@ -17,6 +17,7 @@ from cogmap.services.sim.rendering.wall import PX_PER_M, Image
 
 Vertex = tuple[float, float, float]
 UV = tuple[float, float]
+# Looks: the height of a gable; the roof's picture; the wall that is repeated around an outline.
 _ROOF_RISE_M = 2.2
 _ROOF = 4
 _BAY_M = 8.0

@@ -10,6 +10,7 @@ import numpy as np
 
 from cogmap.services.sim.rendering.wall import Wall
 
+# A usual height, as LEVEL_M of osm/buildings.py.
 STOREY_M = 3.0
 
 

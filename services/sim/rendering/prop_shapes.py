@@ -19,6 +19,7 @@ Colours = tuple[Colour, Colour]
 
 _SIDES = 9
 _ANGLES_RAD: list[float] = np.linspace(0, math.tau, _SIDES + 1).tolist()
+# Strength of the grain that stereo matching needs: twice a wall's.
 _GRAIN = 0.25
 _DARK: Colour = (40, 42, 46)
 _RED: Colour = (206, 34, 30)

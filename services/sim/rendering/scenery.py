@@ -14,6 +14,7 @@ from cogmap.services.sim.layout.plan import PAVEMENT_WIDTH_M, Point, Road
 from cogmap.services.sim.rendering.mesh import Mesh, Vertex, cuts
 from cogmap.services.sim.rendering.wall import Image, plain, roughen
 
+# The ground around the robot reaches beyond the sky, and the sky beyond all that is shown (95 m).
 GROUND_M = 200.0
 GRASS_TILE_M = 8.0
 _DASH_M = 2.0

@@ -18,6 +18,7 @@ from cogmap.services.sim.robot import upright_quaternion
 from cogmap.services.sim.stdio import pybullet
 
 NOT_SOLID = -1
+# Deep below the ground: the camera's images reach 400 m.
 HIDDEN_M = -1000.0
 _ORIGIN = (0.0, 0.0)
 _UPRIGHT = (0, 0, 0, 1)

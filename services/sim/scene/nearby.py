@@ -12,6 +12,8 @@ import numpy as np
 
 from cogmap.services.sim.layout.plan import Point
 
+# Nearer parts are added, farther ones hidden: beyond the 60 m of CAMERA_RANGE_M, and so far apart
+# that a part does not come and go.
 ADDED_M = 80.0
 HIDDEN_M = 95.0
 # How far the robot moves before the parts near it are chosen again, and how many are added then.

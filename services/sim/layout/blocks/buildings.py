@@ -12,11 +12,13 @@ from cogmap.services.sim.layout.blocks.districts import Builder, Districts, func
 from cogmap.services.sim.layout.catalogue import BuildingType
 from cogmap.services.sim.layout.plan import PAVEMENT_WIDTH_M, Plot, Rectangle, Road
 
+# Least gaps, as in a town of one loop; between the places along a street that are tried.
 STREET_GAP_M = 0.2
 BUILDING_GAP_M = 1.0
 STEP_M = 1.5
 GARDEN_M = (0.3, 1.5)
 BETWEEN_M = (1.2, 3.5)
+# Buildings of a district that wait for a place where they fit; shorter streets get none.
 CANDIDATES = 3
 MIN_LENGTH_M = 12.0
 

@@ -14,6 +14,8 @@ from cogmap.services.sim.layout.blocks.streets import Grid
 from cogmap.services.sim.layout.catalogue import CATALOGUE, BuildingType, Colour
 from cogmap.services.sim.layout.plan import Point
 
+# Made up: the share of buildings with their district's function; how many districts there are, by
+# the side of the grid; choices of their places, of which the one farthest apart is kept.
 OWN_FUNCTION = 0.85
 MIN_DISTRICTS = 3
 METRES_A_DISTRICT = 75.0

@@ -12,6 +12,8 @@ from cogmap.services.sim.layout.blocks.streets import Streets
 from cogmap.services.sim.layout.furniture import Prop, line_pavements, prop_of_kind
 from cogmap.services.sim.layout.plan import Plot, Road
 
+# Made up: about how far props on pavements are apart; parked cars from their kerb, from crossings
+# and from one another; the kiosk from the middle of the square.
 PAVEMENT_SPACING_M = 9.0
 KERB_GAP_M = 0.25
 CROSSING_M = 12.0

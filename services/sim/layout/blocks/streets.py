@@ -17,10 +17,12 @@ from cogmap.services.sim.layout.plan import Point, Road
 Crossing = tuple[int, int]
 Stretch = tuple[Crossing, Crossing]
 
+# Made up: the margin around the grid, and about how far its streets are apart.
 EDGE_M = 20.0
 BLOCK_M = 48.0
 UNEVEN = (0.86, 1.18)
 WIDTHS_M = {"Avenue": 11.0, "Street": 8.0, "Lane": 6.0}
+# Made up: the width of dead ends, and the share of stretches that are left out at most.
 ALLEY_M = 5.0
 MISSING_SHARE = 0.22
 DEAD_END_SHARE = (0.4, 0.6)

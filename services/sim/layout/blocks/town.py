@@ -12,6 +12,7 @@ from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Road
 from cogmap.services.sim.layout.starts import start_on
 
+# As `sim.town_size_m` is by default.
 SIZE_M = 200.0
 
 

@@ -17,13 +17,16 @@ from cogmap.services.sim.layout.catalogue import BuildingType, Colour
 from cogmap.services.sim.layout.osm.streets import Positions, metres
 from cogmap.services.sim.layout.plan import Plot
 
+# Usual heights, of a storey and of a building without tags; bounds against mistyped heights.
 LEVEL_M = 3.0
 USUAL_M = 7.0
 LOWEST_M = 2.5
 HIGHEST_M = 120.0
+# Smaller outlines are left out, and smaller bends straightened.
 SMALLEST_M2 = 8.0
 STRAIGHT_M = 0.2
 CORNERS = 3
+# As long as a name in a message may be (schemas/base.py).
 MAX_NAME = 200
 NO_WALLS = ("no", "roof", "carport")
 _TRIM: Colour = (240, 238, 232)

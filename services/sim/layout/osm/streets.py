@@ -27,6 +27,7 @@ WIDTHS_M = {
     "road": 6.0,
     "service": 4.5,
 }
+# Bounds against mistyped widths.
 NARROWEST_M = 3.0
 WIDEST_M = 30.0
 # A bend that leaves the straight line by less is straightened.

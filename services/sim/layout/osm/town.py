@@ -20,8 +20,11 @@ from cogmap.services.sim.layout.osm.streets import Positions, roads
 from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import Point, Road
 
+# The paper's maps of cities are not larger (§6).
 LARGEST_KM2 = 4.0
+# Free around the start: more than twice HALF_WIDTH_M of the robot.
 ROOM_M = 1.5
+# Roads that are compared with all walls at once: their arrays fit into memory.
 CHUNK = 256
 
 
