@@ -18,6 +18,7 @@ from cogmap.bus.session import ready_key
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Topic
 
+# How long the tokens of all members may take to come.
 ANSWER_TIMEOUT_S = 2.0
 # By default a query's channel has room for 256 tokens, and the next one blocks the session.
 MAX_TOKENS = 65_536

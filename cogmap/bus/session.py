@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_AGENT = "agent"
+# How long a client waits for a router, and between two attempts; TCP's greatest port.
 CONNECT_TIMEOUT_S = 5.0
 RETRY_S = 0.05
 MAX_PORT = 65535

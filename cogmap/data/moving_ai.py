@@ -21,6 +21,7 @@ PASSABLE = frozenset(".GS")
 KNOWN = PASSABLE | frozenset("@OTW")
 HEADER = {"type": "type octile", "height": "height and a number", "width": "width and a number"}
 VERSIONS = (["version", "1"], ["version", "1.0"])
+# A quarter of a gigabyte, a byte a cell; and the fields of a problem's line, by the format.
 MAX_CELLS = 1 << 28
 _FIELDS = 9
 _MAP = "a grid map in the MovingAI format (.map)"

@@ -17,7 +17,9 @@ from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pose_graph import PoseGraph, mahalanobis2, residuals
 from cogmap.geometry.arrays import Booleans
 
+# Yang et al.'s.
 CONVEXITY_FACTOR = 1.4
+# A bound: convexity grows 10^8-fold in so many rounds. Closures of the least weight are outliers.
 MAX_ROUNDS = 60
 MIN_WEIGHT = 1e-6
 # A round need not converge: the next one has other weights.

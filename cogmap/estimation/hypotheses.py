@@ -20,6 +20,7 @@ from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pose_graph import Constraints, PoseGraph, cost
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 
+# In places of the path, at either end of a closure.
 SAME_PLACES = 5
 # A path that a false hypothesis has bent is far from linear: so many in a row, of those that seem
 # most doubtful, must hold when it is solved again without them.

@@ -24,6 +24,7 @@ from cogmap.estimation.pose_graph import (
 )
 from cogmap.geometry.arrays import Floats, Indices
 
+# If the cost exceeds its prediction by a larger share, so many iterations at most correct the path.
 TOLERANCE = 0.01
 ITERATIONS_PER_CLOSURE = 10
 

@@ -19,8 +19,11 @@ from cogmap.estimation.pose_graph import (
 )
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 
+# A step that gains a smaller share of the cost is the last; the iterations are a bound.
 RELATIVE_DECREASE = 1e-5
 MAX_ITERATIONS = 100
+# Share of the diagonal that is added after a step that raised the cost, first and at most, and by
+# how much it grows and shrinks from step to step.
 MIN_DAMPING = 1e-9
 MAX_DAMPING = 1e8
 DAMPING_FACTOR = 10.0

@@ -18,6 +18,7 @@ from cogmap.estimation.pose_graph import Constraints, adjacency
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import cumulative, integrate, transform_from, wrap_angle
 
+# Not to be changed alone: `consistent` looks for triangles of views.
 MIN_AGREEING = 3
 # With more uncertainty between them than this, any two views would agree.
 MAX_SD_M = 5.0

@@ -27,6 +27,7 @@ from cogmap.estimation.pose_graph import (
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import cumulative, rotate, rotation_matrices
 
+# Replays between two computations of the cost, which takes about as long as a replay.
 CHECK_EVERY = 10
 
 

@@ -9,6 +9,7 @@ from bisect import bisect_left
 from cogmap.schemas.graph import Decay
 from cogmap.schemas.nodes import KINDS, GraphNode
 
+# Later than any cycle, and longer than any node lives.
 NEVER = 2**62
 _MAX_AGE = 2**40
 

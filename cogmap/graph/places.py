@@ -18,6 +18,7 @@ from cogmap.schemas.nodes import TILE_SIDE, LinkKind, PlaceColumn, place_id
 
 Column = npt.NDArray[np.float32]
 TileKey = tuple[str, int, int]
+# 128 MiB a column.
 MAX_WINDOW_CELLS = 2**25
 _SHAPE = (TILE_SIDE, TILE_SIDE)
 

@@ -12,6 +12,7 @@ from cogmap.graph.graph import Graph
 from cogmap.schemas import topics
 from cogmap.schemas.graph import Delta, Snapshot, SnapshotRequest
 
+# For those that only watch; a module that follows the graph waits longer.
 SNAPSHOT_TIMEOUT_S = 2.0
 
 

@@ -12,6 +12,7 @@ from cogmap.graph.window import Extent
 from cogmap.schemas.nodes import TILE_SIDE
 
 Slices = tuple[slice, slice]
+# A key of 64 bits holds x and y of a tile, 32 bits each.
 _KEY_STEP = 2**32
 
 

@@ -22,6 +22,7 @@ from cogmap.schemas.topics import BY_NAME, Delivery, Topic
 
 log = logging.getLogger("cogmap")
 MODULE = "recorder"
+# How often it looks whether it is to stop.
 IDLE_S = 0.25
 
 

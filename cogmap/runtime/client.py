@@ -10,6 +10,7 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 
+# How often it looks whether it is to end.
 IDLE_S = 0.05
 
 

@@ -11,6 +11,7 @@ from cogmap.graph.graph import Graph
 from cogmap.graph.replica import Fetched, Replica, snapshot_over
 from cogmap.schemas.graph import Delta, SnapshotRequest
 
+# Pause after a failure; an answer takes long if the workspace is busy and the graph large.
 RETRY_S = 0.5
 TIMEOUT_S = 20.0
 

@@ -13,6 +13,7 @@ from cogmap.runtime.delivery.publisher import Publisher
 from cogmap.runtime.module import Module
 from cogmap.schemas.process import Health
 
+# Messages by whose times p50 and p99 are computed.
 _RECENT = 512
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import ctypes
 
+# Twice what sensory memory frees with each frame; glibc takes no larger threshold of mmap.
 KEPT_BYTES = 32 * 2**20
+# From glibc's malloc.h.
 _M_TRIM_THRESHOLD = -1
 _M_MMAP_THRESHOLD = -3
 

@@ -21,8 +21,11 @@ from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.state.store import Store
 
 log = logging.getLogger("cogmap")
+# How often it looks whether it is asked to end.
 IDLE_S = 0.25
+# Added to the niceness, which ends at 19.
 PATIENT = 10
+# To end by itself after its launcher has ended, which would have waited as long.
 ORPHAN_GRACE_S = 10.0
 
 

@@ -28,6 +28,7 @@ from cogmap.schemas.graph import Delta
 from cogmap.schemas.process import Presence
 
 log = logging.getLogger("cogmap")
+# How often health is published, and a graph that is behind or empty asked for again.
 HEALTH_PERIOD_NS = 1_000_000_000
 RETRY_PERIOD_NS = 500_000_000
 START = "@start"

@@ -10,6 +10,7 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Bytes, Singles
 from cogmap.schemas.sensing import View
 
+# With a shorter one a calibration is refused: it is no camera's.
 MIN_FOCAL_LENGTH_PX = 1.0
 
 

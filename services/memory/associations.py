@@ -18,6 +18,7 @@ from cogmap.services.memory.sparse.config import SparseConfig
 from cogmap.services.memory.sparse.structures import ItemMemory
 from cogmap.services.memory.sparse.vectors import bundle
 
+# An object's vector has its so many nearest neighbours, with distances in such steps.
 NEIGHBOURS = 6
 APART_STEP_M = 5.0
 LOOK = "look"

@@ -16,10 +16,14 @@ from cogmap.estimation.alignment import motion_onto
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import rotate, transform_from, wrap_angle
 
+# Pairs nearer than this hardly tell the turn, and farther ones are left out. The maximum bounds the
+# time: hypotheses by the farthest pairs come first.
 NEAREST_PAIR_M = 6.0
 FARTHEST_PAIR_M = 80.0
 MAX_HYPOTHESES = 4000
+# Fits of the best pose to all that it matches, which may then match more.
 REFINEMENTS = 3
+# Poses whose places for the middle of what is here, and turns, differ by less (15°) are the same.
 SAME_POSE_M = 5.0
 SAME_POSE_RAD = 0.26
 NOWHERE = -1

@@ -16,13 +16,18 @@ import numpy as np
 from cogmap.geometry.arrays import Bytes, Singles
 from cogmap.schemas.sensing import Calibration
 
+# OpenCV's: disparities are in sixteenths of a pixel.
 STEPS_PER_PIXEL = 16
+# The matcher's block, and the most disparities that it tries: a bound on its time.
 BLOCK_PX = 5
 MAX_DISPARITIES = 256
+# Steps of the refinement, by what is in a window; the matcher errs by less than MAX_STEP_PX.
 WINDOW_PX = (9, 9)
 REFINEMENTS = 2
 MAX_STEP_PX = 0.5
+# Less is no match: with the town's camera it would be farther than 400 m.
 MIN_DISPARITY_PX = 0.25
+# Added to the squared slope of brightness, so that noise alone moves little.
 NOISE_GRADIENT = 1.0
 
 

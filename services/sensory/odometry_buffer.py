@@ -9,6 +9,7 @@ from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import Odometry
 
 NS_PER_S = 1_000_000_000
+# Far more than wheels do: such odometry is a mistake.
 MAX_SPEED_M_S = 100.0
 MAX_TURN_RATE_RAD_S = 100.0
 # A stamp that is further ahead of the odometry is a mistake.

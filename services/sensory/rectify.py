@@ -15,6 +15,7 @@ from cogmap.schemas.sensing import Calibration
 
 Maps = tuple[Singles, Singles]
 
+# Outside these limits a calibration is refused: it is no camera's.
 MIN_FOCAL_PX = 1.0
 MAX_FOCAL_PX = 1e5
 STRAIGHT = (0.0, 0.0, 0.0)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from cogmap.geometry.arrays import Floats, Singles
 from cogmap.schemas.sensing import Calibration
 
+# What was nearer or behind counts as being here, so that nothing is divided by 0.
 MIN_AHEAD_M = 0.3
 
 

@@ -19,19 +19,28 @@ from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
 from cogmap.schemas.sensing import Calibration
 from cogmap.services.sensory.reprojection import Points, points_at, project_back, surface
 
+# Corners that are looked for; with fewer that are found the wheels alone measure the motion.
 CORNERS = 160
 MIN_TRACKED = 12
+# Corners have a depth between these. Pixels of unknown depth are redrawn as if on the horizon.
 MIN_DEPTH_M = 2.0
 MAX_DEPTH_M = 40.0
 HORIZON_M = 1000.0
+# Of a tracked corner; one that misfits by OUTLIER_PX has a quarter of its weight, and where more
+# than half misfit by that much the motion is not believed.
 TRACK_SD_PX = 1.2
 OUTLIER_PX = 3.0
 MIN_INLIER_SHARE = 0.5
+# A bound on the steps; smaller ones than CONVERGED, in m and rad, end them; and the differences by
+# which derivatives are computed.
 ITERATIONS = 6
 CONVERGED = 1e-6
 DIFFERENCE = 1e-5
+# Between two views the robot hardly tilts or moves sideways.
 TILT_SD_RAD = 0.01
 SIDEWAYS_SD_M = 0.01
+# How far distances seen may all be wrong, as a share; in the town it was 0.001. Shorter ones than
+# MIN_SCALED_M do not correct it.
 SCALE_SD = 0.005
 MIN_SCALED_M = 0.05
 

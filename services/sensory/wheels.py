@@ -9,6 +9,7 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.services.sensory.visual_odometry import Motion
 
+# With less, the ratio of distances is one of noise.
 STILL_M = 1e-3
 
 

@@ -10,6 +10,7 @@ from cogmap.bus.interface import Bus
 from cogmap.schemas import topics
 from cogmap.schemas.process import Clock
 
+# How long one wait lasts; it ends earlier if the pause does.
 _PAUSE_S = 60.0
 
 

@@ -21,6 +21,7 @@ from cogmap.runtime.module import Module
 
 Sections = dict[str, dict[str, Any]]
 Build = Callable[[str, Sections, str], Module]
+# Input from which on several processes share a replay: they take time to start.
 _MIN_PARALLEL_BYTES = 32 * 2**20
 
 

@@ -30,6 +30,7 @@ ENVELOPES = "_envelope"
 RECORDING = "recording"
 MEMBER = "member"
 SUMMARY = "summary"
+# MCAP's: unsigned numbers of 64 and of 32 bits.
 MAX_TIME_NS = 2**64 - 1
 _MAX_SEQUENCE = 2**32 - 1
 

@@ -28,6 +28,7 @@ from cogmap.recording.storage.versions import check_readable
 from cogmap.schemas.base import Message
 from cogmap.schemas.topics import BY_NAME, Topic
 
+# Some 50 MB, since records are asked for roughly in order.
 _CACHED_CHUNKS = 12
 _envelope_decoder = msgspec.msgpack.Decoder(EnvelopeRecord)
 _stub_decoder = msgspec.msgpack.Decoder(Message)

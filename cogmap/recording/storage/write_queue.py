@@ -8,6 +8,7 @@ from collections import Counter, deque
 from cogmap.bus.interface import Arrival, Job
 from cogmap.schemas.topics import Delivery
 
+# A minute's worth of a drive; and what an arrival takes beside its payload, about.
 LIMIT_BYTES = 256 * 2**20
 _OVERHEAD_BYTES = 1024
 

@@ -17,8 +17,10 @@ from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.format import EnvelopeRecord
 from cogmap.schemas.topics import Topic
 
+# What may be lost if the process is killed: messages of so long, or one chunk.
 FLUSH_S = 0.25
 CHUNK_BYTES = 4 * 2**20
+# Of MCAP's own chunks, so that `flush` alone ends one.
 UNBOUNDED = 2**62
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 

@@ -20,7 +20,9 @@ from cogmap.schemas.memory import Stored
 from cogmap.schemas.process import Health
 from cogmap.schemas.topics import Delivery, Topic
 
+# If more wait for an output, health takes them: so they stay few in a module that is silent.
 MAX_CAUSES = 1000
+# Stamps whose traces are kept, the newest.
 MAX_TRACES = 32
 
 

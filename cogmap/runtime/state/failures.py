@@ -9,6 +9,7 @@ from pathlib import Path
 
 from cogmap.errors import StorageError
 
+# SQLite's extended codes have the primary code in their lowest byte.
 PRIMARY = 0xFF
 IN_USE = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 UNWRITABLE = (

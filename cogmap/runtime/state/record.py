@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from hashlib import blake2b
 from typing import NamedTuple
 
+# So many that no two records have one digest by chance.
 DIGEST_BYTES = 16
 _LENGTH_BYTES = 8
 

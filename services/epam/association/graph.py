@@ -20,6 +20,7 @@ from cogmap.schemas.sensing import Associations
 from cogmap.services.epam.config import Priming
 
 MAX_NODES = 512
+"""A full graph replaces the node that was least conscious; 512 nodes have 2 MB of weights."""
 FAINT = 0.01
 """Weaker links are not published, and prime nothing."""
 LEARNING_RATE = 0.1

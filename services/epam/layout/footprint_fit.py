@@ -22,6 +22,8 @@ from cogmap.services.epam.layout.footprint_model import (
     linearized,
 )
 
+# Starts of a fit, evenly over half a turn, as a rectangle has; a bound on its steps; and its first
+# damping, 0.1 of the diagonal, lowered as after a step that improved the fit.
 ORIENTATIONS = 10
 ITERATIONS = 8
 FIRST_DAMPING = 0.1 * 0.2

@@ -12,8 +12,11 @@ import numpy.typing as npt
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.schemas.sensing import Calibration
 
+# Columns at which a fit compares disparities, however wide the object is.
 COLUMNS = 20
+# Of the column where an object ends.
 EDGE_SD_PX = 1.2
+# What is nearer counts as being here, so that nothing is divided by 0.
 MIN_RANGE_M = 0.5
 # Of differences: x and z in metres, orientation in radians.
 STEPS = (1e-3, 1e-3, 1e-4)

@@ -10,6 +10,7 @@ from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.schemas.sensing import Calibration
 from cogmap.services.epam.layout.ground_plane import GroundPlane, fit, focal_baseline, ray_slopes
 
+# Road farther away is left out; a cell has half the side of a place.
 MAX_RANGE_M = 15.0
 CELL_M = 0.5
 # A pixel that is nearer than the ground by more than this is upright, unless it is a speck.

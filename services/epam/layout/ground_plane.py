@@ -16,13 +16,16 @@ import numpy.typing as npt
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.schemas.sensing import Calibration
 
+# One pixel in so many each way is used; its disparity's standard deviation.
 STRIDE_PX = 4
 DISPARITY_SD_PX = 0.3
 # Disparity errors of neighbouring pixels are correlated: this many pixels count as one.
 CORRELATED_PIXELS = 6.0
+# Standard deviations of how nearly the camera is level, and at its mount's height.
 ROLL_SD_RAD = 0.02
 HEIGHT_SD_SHARE = 0.05
 PITCH_SD_RAD = 0.02
+# Disparities that misfit by more count for nothing: a limit for each round.
 CUTOFFS_PX = (4.0, 2.0, 1.5, 1.5)
 
 

@@ -16,6 +16,7 @@ from cogmap.services.epam.config import Processor
 from cogmap.services.epam.network import WEIGHTS, Network
 
 DEFAULT_PATH = WEIGHTS / "road.onnx"
+# Half the camera's sides; the weights are trained for them.
 WIDTH_PX = 160
 HEIGHT_PX = 120
 # Rows above and below, so that the network can halve the image often enough.
@@ -25,9 +26,13 @@ INPUT_SHAPE = (1, CHANNELS, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)
 OUTPUT_SHAPES: dict[str, tuple[int, ...]] = {
     "road": (1, 1, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX),
 }
+# The mean, in grey levels, that images are scaled to, as in training; one that is darker than
+# MIN_GREY is scaled as if it were that bright.
 MEAN_GREY = 112.0
 MIN_GREY = 20.0
+# Grey levels: an image with a smaller standard deviation shows nothing.
 MIN_CONTRAST = 3.0
+# Of the image: smaller specks of road are removed, smaller holes filled.
 MIN_ROAD_SHARE = 0.002
 MAX_HOLE_SHARE = 0.0005
 OPENING = np.ones((3, 3), np.uint8)

@@ -15,6 +15,8 @@ import numpy as np
 
 from cogmap.geometry.arrays import Bytes, Singles
 
+# A thumbnail with a quarter of the camera's sides, its rows down to just below the middle; a cell's
+# side in its pixels, a patch's in cells.
 COLUMNS = 80
 ROWS = 60
 ROWS_ABOVE_HORIZON = 32
@@ -22,11 +24,16 @@ CELL = 4
 PATCH = 4
 SHIFTS = (-6, -4, -2, 0, 2, 4, 6)
 UNSHIFTED = SHIFTS.index(0)
+# Grey levels added before the logarithm, so that noise in the dark counts for little.
 DARK_LEVEL = 8.0
+# Standard deviations of log brightness: added to a patch's, so that a flat one does not show noise,
+# and the least that counts. A view with fewer patches of that much has no descriptor.
 FLAT_CONTRAST = 0.1
 MIN_CONTRAST = 0.04
 MIN_PATCHES = 3
+# Steps of a code for a standard deviation: a byte holds four to either side.
 LEVELS = 32.0
+# Of the upper half of a view this share at least must be so near.
 NEAR_M = 30.0
 MIN_NEAR_SHARE = 0.06
 CELL_ORIGINS = np.arange(SHIFTS[-1], COLUMNS - SHIFTS[-1] - CELL + 1, CELL)[: 4 * PATCH]

@@ -16,10 +16,14 @@ from cogmap.services.epam.recognition.objects import Recognition
 from cogmap.services.epam.recognition.segments import Segment
 from cogmap.services.epam.recognition.walls import Walls, walls
 
+# How far a polygon may be from the outline that it simplifies.
 OUTLINE_TOLERANCE_PX = 1.0
+# Gaps that are bridged, each only if with smaller ones no piece has this share of the segment.
 BRIDGED_PX = (9, 25, 65)
 MIN_OUTLINED_SHARE = 0.9
+# Pieces whose distances differ by more are of two objects.
 MAX_DISPARITY_RATIO = 1.3
+# Limits of a height, since a wrong disparity gives any.
 MIN_HEIGHT_M = 0.5
 MAX_HEIGHT_M = 1e3
 

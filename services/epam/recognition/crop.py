@@ -14,11 +14,17 @@ from cogmap.geometry.arrays import Bytes, Singles
 from cogmap.schemas.sensing import Calibration
 from cogmap.services.epam.recognition.segments import Segment
 
+# The network's input. The weights are trained with all of these values.
 SIDE_PX = 48
 CHANNELS = 12
+# Around a segment, as a share of its longer side.
 MARGIN = 0.04
+# Stands for the distance of a segment without any depth.
 UNKNOWN_DISTANCE_M = 30.0
+# Factor on the logarithm of depths: what is 28 % farther than the segment has 1, the largest.
 RELIEF = 4.0
+# Ground is what is lower. Its colour, and the sky's, is the median of so many pixels at least, one
+# in STRIDE_PX each way.
 GROUND_M = 0.3
 MIN_PIXELS = 12
 STRIDE_PX = 2

@@ -29,10 +29,12 @@ from cogmap.services.epam.recognition.crop import CHANNELS, SIDE_PX, crop, surro
 from cogmap.services.epam.recognition.segments import Segment
 
 DEFAULT_PATH = WEIGHTS / "objects.onnx"
+# Of the network: length of an embedding, and segments a pass. The weights are exported for both.
 DIMENSIONS = 64
 BATCH = 4
 INPUT_SHAPE = (BATCH, CHANNELS, SIDE_PX, SIDE_PX)
 OUTPUT_SHAPES = {"embedding": (BATCH, DIMENSIONS), "odds": (BATCH, 2)}
+# A bound on what one learned building costs.
 MAX_APPEARANCES = 8
 # Appearances with a higher cosine are the same one.
 SAME_COSINE = 0.9

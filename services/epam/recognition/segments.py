@@ -23,17 +23,22 @@ from cogmap.services.epam.config import Processor
 from cogmap.services.epam.network import WEIGHTS, Network
 
 DEFAULT_PATH = WEIGHTS / "segments.onnx"
+# Half the camera's sides, and rows above and below; the weights are trained for them.
 WIDTH_PX = 160
 HEIGHT_PX = 120
 PADDING_PX = 4
 CHANNELS = 8
 INPUT_SHAPE = (1, CHANNELS, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)
 OUTPUT_SHAPES = {"shown": (1, 4, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)}
+# Unit of the network's offsets, as in training.
 OFFSET_PX = 32.0
+# Least probabilities of a centre and of a building; a centre is the likeliest in a square of so
+# many pixels a side; fewer than MIN_PIXELS are no segment.
 MIN_CENTRE = 0.3
 MIN_BUILDING = 0.5
 PEAK_PX = 9
 MIN_PIXELS = 12
+# Grey levels: an image with a smaller standard deviation shows nothing.
 MIN_CONTRAST = 3.0
 # Pieces of one building: where they meet, both point to places nearer to each other than this
 # share of the square root of their area.

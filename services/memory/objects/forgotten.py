@@ -33,6 +33,7 @@ from cogmap.schemas.nodes import (
 from cogmap.services.memory.config import MIN_SIGHTINGS
 from cogmap.services.memory.episodic.corrections import Corrections, Shift
 
+# Base levels that differ by less are equal but for rounding.
 ROUNDING = 1e-9
 LEARNED_BASE_LEVEL = 0.3
 """Base level from which on an object that the workspace forgets by time alone was learned. The

@@ -11,6 +11,7 @@ from cogmap.services.memory.sparse.config import SparseConfig
 from cogmap.services.memory.sparse.interface import Recall, iterated_read
 from cogmap.services.memory.sparse.vectors import random_vectors
 
+# Of LIDA's published framework.
 DIMENSIONS = 1000
 VALUES = 2
 ACCESS_RADIUS = 451

@@ -13,6 +13,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Bytes, Floats, Indices
 
+# Snaider and Franklin (2014): related is what is nearer than the mean by five standard deviations.
 VALUES = 16
 CONTAINED_SDS = 5.0
 NO_LENGTH = 1e-6
