@@ -25,7 +25,7 @@ from cogmap.schemas.graph import Delta
 from cogmap.schemas.sensing import Pose, TruePose, TrueTown
 from cogmap.schemas.topics import Topic
 from cogmap.services import registry
-from cogmap.services.sim.odometry import FUSED
+from cogmap.services.sim.public import odometry
 
 MAX_DRIVE_S = 6000.0
 # A plan of these towns takes some 20 ms, a tenth of a cycle.
@@ -50,7 +50,7 @@ def town_sections(seed: int, has_cameras: bool = False) -> Sections:
         "duration_s": MAX_DRIVE_S,
     }
     if not has_cameras:
-        sim["noise"] = msgspec.to_builtins(FUSED)
+        sim["noise"] = msgspec.to_builtins(odometry.FUSED)
 
     return {
         "run": {

@@ -25,7 +25,7 @@ from cogmap.schemas.array import Matrix
 from cogmap.schemas.graph import Delta, Links, Operation, Phase
 from cogmap.schemas.nodes import SELF_ID, AnyNode, Object, Self, object_id
 from cogmap.schemas.process import Clock
-from cogmap.services.workspace.commit import Ledger
+from cogmap.services.workspace.public import Ledger
 
 AGENT = "benchmark"
 COST_ROUNDS = 400

@@ -28,7 +28,7 @@ from cogmap.schemas.cognition import Behaviours, GuidanceScheme
 from cogmap.schemas.graph import DropNode, Operation
 from cogmap.schemas.nodes import NEVER_NS, Goal, goal_id
 from cogmap.schemas.sensing import TruePose, TrueTown
-from cogmap.services.procedural.guidance.toml import written
+from cogmap.services.procedural.public import toml
 
 ROUTES = 10
 FIRST_SEED = 301
@@ -172,7 +172,7 @@ def drive_twice(seed: int) -> Route:
     guided.max_s = 2 * taught.now_s + STOOD_S
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "schemes.toml"
-        file.write_text(written(teacher.learned.values()))
+        file.write_text(toml.written(teacher.learned.values()))
         sections["procedural"] = {"schemes": str(file)}
         observer = Module("observer").on(topics.TRUE_POSE, guided.on_pose)
         with running([*build(("sim", *COGNITION), sections), observer]) as runner:

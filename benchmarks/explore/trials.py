@@ -14,14 +14,14 @@ from cogmap.cli.launch.guide import streets_ahead
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import nearest_on_line, resample
 from cogmap.schemas.sensing import Street, TrueTown
-from cogmap.services.codelets.mapping.boundary import REACH_M
+from cogmap.services.codelets.public import boundary
 
 LINE_STEP_M = 1.0
 MIN_AWAY_M = 40.0
 REACHED_WITHIN_M = 4.0
 SLOWEST_M_S = 1.0
 GRACE_S = 60.0
-SIGHT_M = REACH_M
+SIGHT_M = boundary.REACH_M
 """How far the agent puts on its map what it sees."""
 
 Point = tuple[float, float]

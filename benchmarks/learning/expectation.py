@@ -39,10 +39,8 @@ from cogmap.schemas.nodes import (
     place_cell,
 )
 from cogmap.schemas.sensing import StreetClosure, TruePose
-from cogmap.services.codelets.attention import expectation
-from cogmap.services.sim.config import Config as SimConfig
-from cogmap.services.sim.config import place_of
-from cogmap.services.sim.layout.place import Place
+from cogmap.services.codelets.public import expectation
+from cogmap.services.sim.public import Place, SimConfig, place_of
 
 TOWNS = 4
 FIRST_SEED = 501

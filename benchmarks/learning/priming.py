@@ -23,10 +23,9 @@ from cogmap.schemas.cognition import Broadcast, Coalition, Relation, Trigger
 from cogmap.schemas.nodes import Object, object_id
 from cogmap.schemas.sensing import Percept, Percepts, Pose, View
 from cogmap.services import registry
-from cogmap.services.epam.recognition.functions import function_of
-from cogmap.services.sim.layout import town
-from cogmap.services.sim.layout.catalogue import CATALOGUE
-from cogmap.services.workspace.ingress import RECOGNITION_THRESHOLD
+from cogmap.services.epam.public import function_of
+from cogmap.services.sim.public import CATALOGUE, town
+from cogmap.services.workspace.public import RECOGNITION_THRESHOLD
 
 TOWNS = 4
 # After the towns of `python -m benchmarks perception`.

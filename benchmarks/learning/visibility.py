@@ -8,12 +8,14 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.robot import calibration
-from cogmap.services.sim.layout.barriers import barriers
-from cogmap.services.sim.layout.boundaries import outlines
-from cogmap.services.sim.layout.place import Place
-from cogmap.services.sim.percept_level.column_camera import NOTHING, ColumnCamera
-from cogmap.services.sim.percept_level.surroundings import Surroundings
-from cogmap.services.sim.percept_level.town_sensors import MIN_COLUMNS
+from cogmap.services.sim.public import (
+    Place,
+    Surroundings,
+    barriers,
+    column_camera,
+    outlines,
+    town_sensors,
+)
 
 
 class Visibility:
@@ -21,7 +23,7 @@ class Visibility:
 
     def __init__(self, place: Place) -> None:
         self._plots = place.plots
-        self._camera = ColumnCamera(calibration())
+        self._camera = column_camera.ColumnCamera(calibration())
         self._surroundings = Surroundings(place)
         self._barriers_m = {}
         for name, barrier in barriers(place.roads).items():
@@ -39,11 +41,11 @@ class Visibility:
 
         near = self._surroundings.near(float(at[0]), float(at[1]))
         walls = self._camera.nearest(at, near.walls_m).segment
-        shown = near.plot[walls[walls != NOTHING]]
+        shown = near.plot[walls[walls != column_camera.NOTHING]]
         columns = int((shown == number).sum())
 
         alone = self._camera.nearest(at, near.walls_m[near.plot == number]).segment
-        needed = max(MIN_COLUMNS, int((alone != NOTHING).sum()) / 2)
+        needed = max(town_sensors.MIN_COLUMNS, int((alone != column_camera.NOTHING).sum()) / 2)
         return columns >= needed
 
     def barrier(self, at: Floats, street: str, reach_m: float) -> bool:
@@ -56,4 +58,4 @@ class Visibility:
         near = self._surroundings.near(float(at[0]), float(at[1]))
         walls = self._camera.nearest(at, near.walls_m).inverse_m
         barrier = self._camera.nearest(at, barrier_m).inverse_m
-        return int((barrier > walls).sum()) >= MIN_COLUMNS
+        return int((barrier > walls).sum()) >= town_sensors.MIN_COLUMNS

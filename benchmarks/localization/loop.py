@@ -33,7 +33,7 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.schemas.sensing import Percepts, SelfMotion
 from cogmap.services import registry
-from cogmap.services.codelets.localization import landmarks, localization
+from cogmap.services.codelets.public import landmarks, localization
 
 # A robot whose senses nobody has calibrated, among landmarks no thicker than a finger: its gains
 # may err by what sensory memory takes for the wheels' noise and the paper for that of distances.

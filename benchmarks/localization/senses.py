@@ -11,7 +11,7 @@ from benchmarks.localization.delay import Delay
 from cogmap.data.mrclam import Robot
 from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import Percept
-from cogmap.services.sensory.module import Config as SensoryConfig
+from cogmap.services.sensory.public import SensoryConfig
 
 TICK_S = 0.2
 STAMP_DECIMALS = 6

@@ -24,7 +24,7 @@ from cogmap.estimation.pose_graph import Constraints, PoseGraph
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import compose, integrate, relative
 from cogmap.parallel import parallel_map
-from cogmap.services.codelets.correction.map_correction import FALSE_CLOSURE
+from cogmap.services.codelets.public import FALSE_CLOSURE
 
 THRESHOLDS = {
     "ate_ratio": at_most(1.1),

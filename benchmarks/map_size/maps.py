@@ -22,8 +22,7 @@ from cogmap.schemas.nodes import (
     nearest_place,
     object_id,
 )
-from cogmap.services.codelets.config import Config
-from cogmap.services.codelets.sub_maps import coarse_places, sub_map_places
+from cogmap.services.codelets.public import CodeletsConfig, coarse_places, sub_map_places
 
 SPREAD_M = 0.3
 CELL_M = 1.0
@@ -75,7 +74,7 @@ def cognitive_map(size: Size, cycle: int = 1000) -> Snapshot:
 
 def _objects(number: int, cycle: int, rng: np.random.Generator) -> list[Object]:
     """Make buildings, none with quite the same numbers as another."""
-    samples = Config().landmark_samples
+    samples = CodeletsConfig().landmark_samples
     radius_m = CLEAR_M + 2 * np.sqrt(number)
     positions_m = rng.uniform(-radius_m, radius_m, (number, 2))
     is_south = positions_m[:, 1] < 0

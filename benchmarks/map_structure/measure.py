@@ -16,8 +16,7 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most, more_than
 from cogmap.experiments.map_structure.boundaries import Boundaries
 from cogmap.geometry.arrays import Floats, Indices
-from cogmap.services.codelets.sub_maps.config import Config
-from cogmap.services.codelets.sub_maps.sub_maps import SubMaps
+from cogmap.services.codelets.public import SubMaps, SubMapsConfig
 
 THRESHOLDS = {
     "ari": at_least(0.9),
@@ -37,10 +36,10 @@ ORDER_SEED = 7
 MAX_COMPONENTS = 24
 MAX_ITERATIONS = 1000
 
-WITHOUT: Mapping[str, Config] = {
-    "ari_without_position": Config(position_weight=0.0, spacing_weight=0.0),
-    "ari_without_function": Config(function_weight=0.0),
-    "ari_without_boundary": Config(boundary_weight=0.0),
+WITHOUT: Mapping[str, SubMapsConfig] = {
+    "ari_without_position": SubMapsConfig(position_weight=0.0, spacing_weight=0.0),
+    "ari_without_function": SubMapsConfig(function_weight=0.0),
+    "ari_without_boundary": SubMapsConfig(boundary_weight=0.0),
 }
 """All but one feature, by the key of their score."""
 
@@ -54,7 +53,7 @@ def measure(setting: Setting) -> Metrics:
     """
     setting.announce(f"finding the districts of {len(SEEDS)} towns")
     towns = [town(seed) for seed in SEEDS]
-    config = Config()
+    config = SubMapsConfig()
     scores = []
     ratios = []
     peers = []
@@ -91,7 +90,7 @@ def measure(setting: Setting) -> Metrics:
     return metrics | city_times()
 
 
-def sub_maps_of(made: Town, config: Config, labels: Indices | None = None) -> SubMaps:
+def sub_maps_of(made: Town, config: SubMapsConfig, labels: Indices | None = None) -> SubMaps:
     """Return the objects of a town, that are in no sub-map yet, or in those that `labels` name."""
     return SubMaps(
         made.positions_m,
@@ -103,7 +102,7 @@ def sub_maps_of(made: Town, config: Config, labels: Indices | None = None) -> Su
     )
 
 
-def _settled(made: Town, config: Config) -> Indices:
+def _settled(made: Town, config: SubMapsConfig) -> Indices:
     """Cluster a town's objects at once, and return their labels (n,)."""
     sub_maps = sub_maps_of(made, config)
     sub_maps.settle()
@@ -122,7 +121,7 @@ def city_times() -> Metrics:
     took_s = []
     for _ in range(REPEATS):
         began_s = time.perf_counter()
-        sub_maps = sub_maps_of(there, Config())
+        sub_maps = sub_maps_of(there, SubMapsConfig())
         sub_maps.settle()
         took_s.append(time.perf_counter() - began_s)
 

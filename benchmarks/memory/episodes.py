@@ -13,10 +13,7 @@ import numpy as np
 from benchmarks.report import Metrics
 from cogmap.schemas.memory import TransientEpisode
 from cogmap.schemas.nodes import Remembered
-from cogmap.services.memory.episodic.config import EpisodicConfig
-from cogmap.services.memory.episodic.cues import MAX_LEARNED, EpisodicCues
-from cogmap.services.memory.episodic.episodic_memory import MIN_MATCH
-from cogmap.services.memory.sparse.config import SparseConfig
+from cogmap.services.memory.public import EpisodicConfig, SparseConfig, cues, episodic_memory
 
 CUES = 200
 LOOKS = 20
@@ -35,9 +32,9 @@ def measure(seed: int) -> Metrics:
     config = EpisodicConfig()
     rng = np.random.default_rng(seed)
     episodes = _episodes(config.max_declarative, rng)
-    cues = EpisodicCues(SparseConfig(seed=seed))
-    for _ in range(0, len(episodes), MAX_LEARNED):
-        cues.hold(episodes)
+    memory = cues.EpisodicCues(SparseConfig(seed=seed))
+    for _ in range(0, len(episodes), cues.MAX_LEARNED):
+        memory.hold(episodes)
 
     right = 0
     wrong = 0
@@ -51,8 +48,8 @@ def measure(seed: int) -> Metrics:
             episode, x_m=episode.x_m + beside_m[0], y_m=episode.y_m + beside_m[1], content=content
         )
 
-        found = cues.recalled(cue, lambda _: True)
-        if found is not None and found.match >= MIN_MATCH:
+        found = memory.recalled(cue, lambda _: True)
+        if found is not None and found.match >= episodic_memory.MIN_MATCH:
             right += found.number == number
             wrong += found.number != number
 

@@ -19,9 +19,7 @@ from cogmap.geometry.se2 import relative, transform_to
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.memory import StoredObjects
 from cogmap.schemas.nodes import TILE_SIDE, Object, individual_label, object_id
-from cogmap.services.memory.maps import RememberedMap
-from cogmap.services.memory.recall import cues, recalled
-from cogmap.services.memory.sequence_cue import Way
+from cogmap.services.memory.public import RememberedMap, Way, recall
 
 TOWNS = 4
 CROSSINGS = 4
@@ -110,7 +108,7 @@ def recalled_after(walk: Walk, stored: Sequence[RememberedMap]) -> tuple[int, Fl
         known = walk.objects(driven_m)
         x_m, y_m = walk.way_m[driven_m].tolist()
         way = Way(walk.way_m[max(0, driven_m - WAY_M) : driven_m], known)
-        found = recalled(cues(known, (x_m, y_m)), way, stored, 1.0)
+        found = recall.recalled(recall.cues(known, (x_m, y_m)), way, stored, 1.0)
         if found is not None:
             return driven_m, found.pose
 

@@ -10,10 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.geometry.arrays import Bytes
-from cogmap.services.memory.sparse.build import build
-from cogmap.services.memory.sparse.config import SparseConfig
-from cogmap.services.memory.sparse.structures import ItemMemory
-from cogmap.services.memory.sparse.vectors import bundle, contained_below, distances, random_vectors
+from cogmap.services.memory.public import ItemMemory, ModularMemory, SparseConfig, vectors
 
 MAPS = 1000
 CUES = 500
@@ -31,7 +28,7 @@ def recall_corrupted(seed: int, maps: int = MAPS) -> float:
     recall is right if of all maps it is nearest to the right one, related to it, and nearer to it
     than the cue was.
     """
-    memory = build(SparseConfig(seed=seed))
+    memory = ModularMemory(SparseConfig(seed=seed))
     rng = np.random.default_rng([seed, 0])
     items = ItemMemory(seed, memory.dimensions, memory.values)
     stored = np.stack([random_map(items, rng) for _ in range(maps)])
@@ -48,10 +45,10 @@ def recall_corrupted(seed: int, maps: int = MAPS) -> float:
             are_right.append(False)
             continue
 
-        apart = distances(stored, recall.vector, memory.values)
-        cue_apart = distances(stored[number], cue, memory.values)
+        apart = vectors.distances(stored, recall.vector, memory.values)
+        cue_apart = vectors.distances(stored[number], cue, memory.values)
         is_nearest = apart.argmin() == number
-        is_related = apart[number] < contained_below(memory.dimensions, memory.values)
+        is_related = apart[number] < vectors.contained_below(memory.dimensions, memory.values)
         are_right.append(bool(is_nearest and is_related and apart[number] < cue_apart))
 
     return float(np.mean(are_right))
@@ -60,7 +57,7 @@ def recall_corrupted(seed: int, maps: int = MAPS) -> float:
 def corrupted(vector: Bytes, share: float, values: int, rng: np.random.Generator) -> Bytes:
     """Return a vector with a share of its dimensions replaced by values drawn uniformly."""
     replaced = rng.permutation(len(vector))[: round(share * len(vector))]
-    (noise,) = random_vectors(rng, 1, len(replaced), values)
+    (noise,) = vectors.random_vectors(rng, 1, len(replaced), values)
 
     cue = vector.copy()
     cue[replaced] = noise
@@ -78,4 +75,4 @@ def random_map(items: ItemMemory, rng: np.random.Generator) -> Bytes:
         fillers[f"place {place}"] = f"object {kind}"
 
     parts = [items.filled(place, kind) for place, kind in sorted(fillers.items())]
-    return bundle(np.stack(parts), items.values)
+    return vectors.bundle(np.stack(parts), items.values)

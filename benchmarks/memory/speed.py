@@ -6,11 +6,9 @@ import numpy as np
 
 from benchmarks.timing import least_cpu_s
 from cogmap.geometry.arrays import Bytes
-from cogmap.services.memory.sparse.config import SparseConfig
-from cogmap.services.memory.sparse.modular import ModularMemory, hard_addresses
-from cogmap.services.memory.sparse.vectors import VALUES, nearest_phases, random_vectors
+from cogmap.services.memory.public import ModularMemory, SparseConfig, hard_addresses, vectors
 
-MASK = np.uint8(VALUES - 1)
+MASK = np.uint8(vectors.VALUES - 1)
 WRITTEN = 50
 LOOP_READS = 10
 MEMORY_READS = 100
@@ -39,7 +37,7 @@ class NumpyLoop:
                 sums += weight * counters.astype(np.float64)
                 weights += weight
 
-        return nearest_phases(sums - weights * self._mean, cue)
+        return vectors.nearest_phases(sums - weights * self._mean, cue)
 
 
 def reads_vs_numpy_loop(seed: int) -> float:
@@ -50,10 +48,10 @@ def reads_vs_numpy_loop(seed: int) -> float:
     config = SparseConfig(seed=seed)
     memory = ModularMemory(config)
     rng = np.random.default_rng([seed, 0])
-    for vector in random_vectors(rng, WRITTEN, config.dimensions):
+    for vector in vectors.random_vectors(rng, WRITTEN, config.dimensions):
         memory.write(vector, vector)
 
-    (cue,) = random_vectors(rng, 1, config.dimensions)
+    (cue,) = vectors.random_vectors(rng, 1, config.dimensions)
     loop = NumpyLoop(config, memory)
     loop_s = least_cpu_s(lambda: loop.read_once(cue), LOOP_READS)
     memory_s = least_cpu_s(lambda: memory.read_once(cue), MEMORY_READS)

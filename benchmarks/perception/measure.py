@@ -10,7 +10,7 @@ from benchmarks.benchmark import Setting, path_option
 from benchmarks.perception import photographs, stereo, towns
 from benchmarks.report import Metrics
 from cogmap.cli.options import FiniteRange
-from cogmap.services.epam.layout.road import DEFAULT_PATH as ROAD_WEIGHTS
+from cogmap.services.epam.public import road
 from cogmap.training.photographs import camvid_iou
 
 OPTIONS = (
@@ -90,7 +90,7 @@ def measure(
     if pair:
         metrics |= stereo.measure(*pair, scale or 1.0)
     if camvid_test:
-        metrics["camvid_iou"] = camvid_iou(road_weights or ROAD_WEIGHTS, *camvid_test)
+        metrics["camvid_iou"] = camvid_iou(road_weights or road.DEFAULT_PATH, *camvid_test)
     if camvid is not None and is_by_drive:
         metrics |= photographs.measure_by_drive(camvid, setting.folder, setting.announce)
     if camvid is not None and not is_by_drive:

@@ -9,7 +9,7 @@ from dataclasses import astuple, dataclass
 from benchmarks.perception.objects import Sight
 from benchmarks.perception.scenes import MIN_TURN_RAD, other_distance
 from cogmap.geometry.arrays import Floats
-from cogmap.services.workspace.ingress import RECOGNITION_THRESHOLD
+from cogmap.services.workspace.public import RECOGNITION_THRESHOLD
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_least
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Booleans, Bytes, Singles
-from cogmap.services.epam.layout.road import load
+from cogmap.services.epam.public import road
 from cogmap.training.photographs import (
     Photograph,
     by_drive,
@@ -82,7 +82,7 @@ def measure_by_drive(
         took_s = time.monotonic() - began_s
 
         metrics[f"camvid_train_minutes_{left_out}"] = took_s / 60
-        metrics[f"camvid_iou_{left_out}"] = road_iou(load(weights).mask, drives[left_out])
+        metrics[f"camvid_iou_{left_out}"] = road_iou(road.load(weights).mask, drives[left_out])
         metrics[f"camvid_prior_{left_out}"] = _mask_iou(mean_mask(known), drives[left_out])
 
     # Each drive counts alike.

@@ -17,11 +17,14 @@ from cogmap.schemas.sensing import (
     View,
 )
 from cogmap.services import registry
-from cogmap.services.epam import module as epam
-from cogmap.services.epam.layout import road
-from cogmap.services.epam.pam import ExtendedPam
-from cogmap.services.epam.recognition import objects, segments
-from cogmap.services.epam.view import view_arrays
+from cogmap.services.epam.public import (
+    EpamConfig,
+    ExtendedPam,
+    objects,
+    road,
+    segments,
+    view_arrays,
+)
 
 PERIOD_S = 0.2
 
@@ -102,7 +105,7 @@ class CandidateProbe:
 
     def __init__(self) -> None:
         self._pam = ExtendedPam(
-            epam.Config(),
+            EpamConfig(),
             segments.load(),
             objects.load(),
             road.load(),

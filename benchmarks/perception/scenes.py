@@ -17,9 +17,8 @@ import numpy.typing as npt
 from cogmap.geometry.arrays import Bytes, Floats, Singles
 from cogmap.robot import calibration
 from cogmap.schemas.sensing import Calibration, Pose
-from cogmap.services.sim.layout import town
-from cogmap.services.sim.rendering.camera import StereoCamera
-from cogmap.services.sim.world import World
+from cogmap.services.sim.public import town
+from cogmap.services.sim.rendering.public import StereoCamera, World
 from cogmap.training.rendering import towns
 
 # Towns to train on have seeds from 1001, those to validate on from 2001.

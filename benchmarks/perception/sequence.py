@@ -19,14 +19,10 @@ from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.polylines import distances_along
 from cogmap.robot import NEAREST_DEPTH_M, calibration
 from cogmap.schemas.sensing import PlaceMatch, Pose
-from cogmap.services.epam.places.recognizer import PlaceRecognizer
-from cogmap.services.sensory.disparity import DepthFromStereo
-from cogmap.services.sensory.rectify import rectification
-from cogmap.services.sim.layout import town
-from cogmap.services.sim.layout.plan import Point
-from cogmap.services.sim.rendering.camera import StereoCamera
-from cogmap.services.sim.rendering.light import Light, some_light
-from cogmap.services.sim.world import World
+from cogmap.services.epam.public import PlaceRecognizer
+from cogmap.services.sensory.public import DepthFromStereo, rectification
+from cogmap.services.sim.public import town
+from cogmap.services.sim.rendering.public import Light, StereoCamera, World, some_light
 from cogmap.training.rendering import towns
 
 # The last town is built of kinds that nobody was taught alone: no landmark in any view.
@@ -122,7 +118,7 @@ def course(place: town.Town) -> list[Stretch]:
 
 
 def poses(
-    line: Sequence[Point],
+    line: Sequence[tuple[float, float]],
     rng: np.random.Generator,
     steps_m: tuple[float, float],
     offset_m: float = 0.0,

@@ -14,7 +14,7 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Bytes, Singles
-from cogmap.services.sensory.disparity import STEPS_PER_PIXEL, StereoMatcher
+from cogmap.services.sensory.public import STEPS_PER_PIXEL, StereoMatcher
 
 OFF_PX = (1, 3)
 PLAIN_BLOCK_PX = 3

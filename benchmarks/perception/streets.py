@@ -12,13 +12,12 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.polylines import nearest_on_pieces
 from cogmap.geometry.se2 import transform_from
 from cogmap.schemas.sensing import Pose
-from cogmap.services.sim.layout.plan import Rectangle
 
 Point = tuple[float, float]
 Piece = tuple[Point, Point]
 
 
-def edges(areas: Sequence[Rectangle]) -> Floats:
+def edges(areas: Sequence[tuple[float, float, float, float]]) -> Floats:
     """Find the outline of the union of `areas`: pieces (n, 2, 2) from point to point.
 
     None runs inside another area.

@@ -33,10 +33,8 @@ from cogmap.cli.progress import bar
 from cogmap.geometry.arrays import Floats, Singles
 from cogmap.parallel import parallel_map
 from cogmap.schemas.sensing import Pose
-from cogmap.services.epam.layout.road import load
-from cogmap.services.sim.layout.catalogue import CATALOGUE
-from cogmap.services.sim.layout.plan import STREET_WIDTH_M
-from cogmap.services.sim.layout.town import Town
+from cogmap.services.epam.public import road as road_network
+from cogmap.services.sim.public import CATALOGUE, STREET_WIDTH_M, town
 from cogmap.training.rendering.towns import KINDS
 
 THRESHOLDS = {
@@ -130,7 +128,7 @@ class TownResult:
 
 def measure_town(seed: int, invented: int, views: int) -> TownResult:
     """Look at the town of `seed` from `views` places; nothing was learned before."""
-    roads = load()
+    roads = road_network.load()
     probe = CandidateProbe()
     sights = []
     candidates = []
@@ -193,7 +191,7 @@ def measure_novel(seed: int, sightings: int) -> Memory:
 def _first_and_again(sightings: int) -> Poses:
     """Draw one pose that meets each of NOVEL buildings, then up to `sightings` others of each."""
 
-    def poses(place: Town, rng: np.random.Generator) -> list[Pose]:
+    def poses(place: town.Town, rng: np.random.Generator) -> list[Pose]:
         first = [encounter(place, target, rng) for target in range(NOVEL)]
         targets = np.repeat(np.arange(NOVEL), sightings)
         again = []
@@ -208,7 +206,7 @@ def _first_and_again(sightings: int) -> Poses:
     return poses
 
 
-def _sight(made: Sequence[Claim], place: Town, scene: Scene) -> Sight:
+def _sight(made: Sequence[Claim], place: town.Town, scene: Scene) -> Sight:
     kinds = [plot.kind.name for plot in place.plots]
     _, range_m = side_and_range(place, scene.pose).T
     return objects.sight(made, scene.label, kinds, range_m.tolist())

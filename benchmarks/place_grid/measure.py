@@ -19,7 +19,7 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Proposal
 from cogmap.schemas.graph import Cells, Delta, Operation, Phase, Snapshot
 from cogmap.schemas.nodes import TILE_SIDE, PlaceColumn
-from cogmap.services.workspace.commit import Ledger
+from cogmap.services.workspace.public import Ledger
 
 THRESHOLDS = {
     "nodes_500k_commit_ms": at_most(5.0),

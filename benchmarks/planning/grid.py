@@ -35,9 +35,7 @@ from cogmap.schemas.nodes import (
     Self,
     goal_id,
 )
-from cogmap.services.codelets.planning import route_plan
-from cogmap.services.codelets.planning.config import Config
-from cogmap.services.codelets.sub_maps import coarse_places
+from cogmap.services.codelets.public import PlanningConfig, coarse_places, route_plan
 
 THRESHOLDS = {
     "solved_share": at_least(1.0),
@@ -60,8 +58,8 @@ CELL_M = 2.0
 AT_GOAL_M = 0.5 * CELL_M
 """A goal is reached in its own cell."""
 
-FLAT = Config(search_places=2**31, reached_m=AT_GOAL_M)
-HIERARCHICAL = Config(search_places=0, reached_m=AT_GOAL_M)
+FLAT = PlanningConfig(search_places=2**31, reached_m=AT_GOAL_M)
+HIERARCHICAL = PlanningConfig(search_places=0, reached_m=AT_GOAL_M)
 GOAL = goal_id("benchmark")
 T = TypeVar("T")
 

@@ -18,12 +18,7 @@ from cogmap.experiments.route_planning.measure import PARTICIPANTS, human_jobs, 
 from cogmap.experiments.route_planning.metrics import human_metrics
 from cogmap.experiments.route_planning.optimum import shortest_tour
 from cogmap.parallel import parallel_map
-from cogmap.services.codelets.planning.tours import (
-    TourSettings,
-    follow_activation,
-    order,
-    route_length,
-)
+from cogmap.services.codelets.public import tours
 
 THRESHOLDS = {
     "hierarchical_above_optimum": at_most(0.08),
@@ -103,18 +98,18 @@ def _excess(job: _Job) -> _Excess:
     if shortest is None:
         shortest = shortest_tour(problem.lengths)
 
-    optimum = route_length(problem.lengths, shortest, closed=True)
+    optimum = tours.route_length(problem.lengths, shortest, closed=True)
     found = []
     for start in range(len(problem)):
         cities = np.roll(np.arange(len(problem)), -start)
         lengths = problem.lengths[np.ix_(cities, cities)]
         positions = problem.positions[cities]
-        tours = (
-            order(lengths, positions, TourSettings()),
-            order(lengths, positions, TourSettings(straightens=False)),
-            follow_activation(lengths),
+        routes = (
+            tours.order(lengths, positions, tours.TourSettings()),
+            tours.order(lengths, positions, tours.TourSettings(straightens=False)),
+            tours.follow_activation(lengths),
         )
-        found.append([route_length(lengths, tour, closed=True) for tour in tours])
+        found.append([tours.route_length(lengths, route, closed=True) for route in routes])
 
     hierarchical, unstraightened, flat = np.mean(found, axis=0).tolist()
     return _Excess(

@@ -16,7 +16,7 @@ from cogmap.cli.progress import bar
 from cogmap.experiments.spiking.cells import Values
 from cogmap.experiments.spiking.network import Border, Cues, Posterior, Recording, exact, record
 from cogmap.parallel import parallel_map
-from cogmap.services.codelets.localization.sampling import rejection_mask
+from cogmap.services.codelets.public import rejection_mask
 
 SIDE_M = 5.0
 RECORDED_S = 600.0
