@@ -74,7 +74,7 @@ class Drive:
         `until_s` on the monotonic clock has come, or `stop` was asked; then end every process.
 
         Raises ProcessFailedError, with its last words, if a process failed before the drive had
-        begun.
+        begun, and KeyboardInterrupt if `stop` was asked before a router answered.
         """
         config = to_toml(self.sections)
         (self.folder / CONFIG_NAME).write_text(config, encoding="utf-8")
@@ -83,7 +83,7 @@ class Drive:
             for program in programs(self.folder, self.endpoint, self.agent, self.choices):
                 self.supervisor.start(program)
             self._note("processes started")
-            watch = Watch(ZenohBus(self.endpoint, self.agent))
+            watch = Watch(ZenohBus(self.endpoint, self.agent, lambda: stop.asked))
             ending = self._drive(watch, until_s, stop, display)
         finally:
             self._close(watch)

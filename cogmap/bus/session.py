@@ -8,6 +8,7 @@ import json
 import re
 import socket
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import zenoh
@@ -19,8 +20,10 @@ if TYPE_CHECKING:
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_AGENT = "agent"
-# How long a client waits for a router, and between two attempts; TCP's greatest port.
+# How long a client waits for a router, for one answer of it, and between two attempts; TCP's
+# greatest port.
 CONNECT_TIMEOUT_S = 5.0
+ANSWER_S = 1.0
 RETRY_S = 0.05
 MAX_PORT = 65535
 # How long a full link delays the others before it drops a message, which the publisher's cache
@@ -54,13 +57,18 @@ def free_endpoint() -> str:
         return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
-def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Session:
+def open_client(
+    endpoint: str,
+    timeout_s: float = CONNECT_TIMEOUT_S,
+    is_asked_to_end: Callable[[], bool] | None = None,
+) -> zenoh.Session:
     """Return a session with the router at `endpoint`. Raises NoRouterError if none answers in
     time.
 
-    Until something listens there, Ctrl-C ends the wait at once.
+    Until something listens there, Ctrl-C ends the wait at once; so does `is_asked_to_end`, where a
+    process takes signals itself: it raises KeyboardInterrupt then.
     """
-    left_s = _await_listener(endpoint, timeout_s)
+    left_s = _await_listener(endpoint, timeout_s, is_asked_to_end or (lambda: False))
     settings = {
         "connect/endpoints": [endpoint],
         "connect/timeout_ms": int(left_s * 1000),
@@ -80,7 +88,7 @@ def open_client(endpoint: str, timeout_s: float = CONNECT_TIMEOUT_S) -> zenoh.Se
         ) from None
 
 
-def _await_listener(endpoint: str, timeout_s: float) -> float:
+def _await_listener(endpoint: str, timeout_s: float, is_asked_to_end: Callable[[], bool]) -> float:
     """Wait until something listens at `endpoint`, at most `timeout_s`. Returns the time left.
 
     Zenoh would wait with Python's signals unanswered.
@@ -88,8 +96,10 @@ def _await_listener(endpoint: str, timeout_s: float) -> float:
     address = _address(endpoint)
     until_s = time.monotonic() + timeout_s
     while (left_s := until_s - time.monotonic()) > RETRY_S:
+        if is_asked_to_end():
+            raise KeyboardInterrupt
         try:
-            socket.create_connection(address, left_s).close()
+            socket.create_connection(address, min(left_s, ANSWER_S)).close()
             break
         except OSError:
             time.sleep(RETRY_S)

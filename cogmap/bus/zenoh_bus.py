@@ -38,17 +38,20 @@ class _Closable(Protocol):
 
 
 class ZenohBus:
-    """Connects to the router at `endpoint` as `agent`.
+    """Connects to the router at `endpoint` as `agent`, until which `is_asked_to_end` may end the
+    wait, see `open_client`.
 
     Raises NoRouterError if none answers in time, and UsageError for a name that cannot be part
     of a key.
     """
 
-    def __init__(self, endpoint: str, agent: str) -> None:
+    def __init__(
+        self, endpoint: str, agent: str, is_asked_to_end: Callable[[], bool] | None = None
+    ) -> None:
         check_name("--agent", agent)
         sys.setswitchinterval(SWITCH_S)
         self._agent = agent
-        self._session = open_client(endpoint)
+        self._session = open_client(endpoint, is_asked_to_end=is_asked_to_end)
         self._publishers: dict[Topic, Any] = {}
         self._declared: list[_Closable] = []
         self._is_named = False

@@ -152,10 +152,20 @@ def test_whoever_finds_no_router_within_five_seconds_names_it(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    "command", [["topic", "list"], ["topic", "echo", "clock"], ["graph"], ["module", "action"]]
+    "command",
+    [
+        ["topic", "list", "--connect", NO_ROUTER],
+        ["topic", "echo", "clock", "--connect", NO_ROUTER],
+        ["graph", "--connect", NO_ROUTER],
+        ["module", "action", "--connect", NO_ROUTER],
+        ["run", "--out", "RUN", "--router", NO_ROUTER],
+    ],
+    ids=lambda command: command[0],
 )
-def test_ctrl_c_ends_whoever_waits_for_a_router_before_it_gives_up(command: list[str]) -> None:
-    process = start(*command, "--connect", NO_ROUTER)
+def test_ctrl_c_ends_whoever_waits_for_a_router_before_it_gives_up(
+    command: list[str], tmp_path: Path
+) -> None:
+    process = start(*(argument.replace("RUN", str(tmp_path / "run")) for argument in command))
     wait_until(lambda: is_waiting(process.pid), "it waits for a router")
     process.send_signal(signal.SIGINT)
 
