@@ -10,6 +10,9 @@ from cogmap.services.sim.layout.catalogue import BuildingType
 # As wide as a `tertiary` road of OpenStreetMap, and a made-up pavement on each side.
 STREET_WIDTH_M = 8.0
 PAVEMENT_WIDTH_M = 2.0
+# Least gaps from a building to a pavement, and to another building.
+STREET_GAP_M = 0.2
+BUILDING_GAP_M = 1.0
 # Less than this aside, a road runs along an axis: above the rounding of coordinates.
 LEVEL_M = 1e-6
 

@@ -14,7 +14,9 @@ from cogmap.services.sim.layout.catalogue import CATALOGUE, BuildingType
 from cogmap.services.sim.layout.furniture import furnish
 from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.plan import (
+    BUILDING_GAP_M,
     PAVEMENT_WIDTH_M,
+    STREET_GAP_M,
     STREET_WIDTH_M,
     Plot,
     Point,
@@ -26,9 +28,6 @@ from cogmap.services.sim.layout.plan import (
 # Of the catalogue's 24 kinds; and how many kinds are tried where one is to be built.
 MIN_BUILDINGS = 21
 CANDIDATES = 6
-# Least gaps from a building to a pavement, and to another building.
-STREET_GAP_M = 0.2
-BUILDING_GAP_M = 1.0
 _REACH_M = STREET_WIDTH_M / 2 + PAVEMENT_WIDTH_M
 
 

@@ -12,7 +12,7 @@ from cogmap.robot import NEAREST_DEPTH_M
 from cogmap.schemas.nodes import ENERGY, SATISFIED_BY
 from cogmap.schemas.sensing import Percept, Pose
 from cogmap.services.sim.layout.furniture import Prop
-from cogmap.services.sim.percept_level.column_camera import NEAR_M, ColumnCamera
+from cogmap.services.sim.percept_level.column_camera import NEAR_M, WHOLE_SHARE, ColumnCamera
 from cogmap.services.sim.percept_level.percepts import PerceptErrors, PerceptSim
 from cogmap.services.sim.trajectory import Landmark
 
@@ -22,8 +22,6 @@ FARTHEST_M = 30.0
 MIN_SHARE = 0.5
 """A post is seen if walls hide less than the rest of its width."""
 
-# It is whole if so large a part of its width is seen, as a building is (town_sensors.py).
-WHOLE_SHARE = 0.9
 _STREAM = 0xC5
 
 

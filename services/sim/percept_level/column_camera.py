@@ -19,6 +19,8 @@ from cogmap.schemas.sensing import Calibration
 # What is nearer is cut off: the robot's body keeps 0.3 m before its camera.
 NEAR_M = 0.05
 NOTHING = -1
+# A building or a post is whole in a view if so large a part of its columns shows it.
+WHOLE_SHARE = 0.9
 # Below this, a line leads through the camera or runs across its axis: above rounding.
 _EDGE_ON_M = 1e-9
 

@@ -17,6 +17,7 @@ from cogmap.services.sim.percept_level.charging_sight import ChargingSight
 from cogmap.services.sim.percept_level.column_camera import (
     NEAR_M,
     NOTHING,
+    WHOLE_SHARE,
     Buffer,
     ColumnCamera,
     depths_m,
@@ -37,9 +38,6 @@ SECTORS = 32
 
 MIN_COLUMNS = 8
 """A building is seen if so many image columns show it."""
-
-WHOLE_SHARE = 0.9
-"""It is whole if so large a part of its columns show it."""
 
 COMMON_SHARE = 0.5
 """How much of the variance of the road's boundary is the same all over one view."""

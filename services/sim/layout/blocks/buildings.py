@@ -10,11 +10,16 @@ import numpy as np
 
 from cogmap.services.sim.layout.blocks.districts import Builder, Districts, function_of
 from cogmap.services.sim.layout.catalogue import BuildingType
-from cogmap.services.sim.layout.plan import PAVEMENT_WIDTH_M, Plot, Rectangle, Road
+from cogmap.services.sim.layout.plan import (
+    BUILDING_GAP_M,
+    PAVEMENT_WIDTH_M,
+    STREET_GAP_M,
+    Plot,
+    Rectangle,
+    Road,
+)
 
-# Least gaps, as in a town of one loop; between the places along a street that are tried.
-STREET_GAP_M = 0.2
-BUILDING_GAP_M = 1.0
+# Between the places along a street that are tried.
 STEP_M = 1.5
 GARDEN_M = (0.3, 1.5)
 BETWEEN_M = (1.2, 3.5)
