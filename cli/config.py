@@ -167,17 +167,12 @@ def _range(schema: Schema) -> str:
     """
     lowest = schema.get("minimum", schema.get("exclusiveMinimum"))
     highest = schema.get("maximum", schema.get("exclusiveMaximum"))
-    if lowest is None and highest is None:
-        longest = schema.get("maxLength")
-        return "" if longest is None else f"{schema.get('minLength', 0)} to {longest} characters"
+    if lowest is not None and highest is not None:
+        words = f"{_number(lowest)} to {_number(highest)}"
+        return f"above {words}" if "exclusiveMinimum" in schema else words
 
-    words = []
-    if lowest is not None:
-        at_least = "" if highest is not None else "at least "
-        words.append(("above " if "exclusiveMinimum" in schema else at_least) + _number(lowest))
-    if highest is not None:
-        words.append(("to " if words else "at most ") + _number(highest))
-    return " ".join(words)
+    longest = schema.get("maxLength")
+    return "" if longest is None else f"{schema.get('minLength', 0)} to {longest} characters"
 
 
 def _number(value: float) -> str:

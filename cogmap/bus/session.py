@@ -65,8 +65,8 @@ def open_client(
     """Return a session with the router at `endpoint`. Raises NoRouterError if none answers in
     time.
 
-    Until something listens there, Ctrl-C ends the wait at once; so does `is_asked_to_end`, where a
-    process takes signals itself: it raises KeyboardInterrupt then.
+    Until something listens there, Ctrl-C ends the wait at once. A process that handles signals
+    itself gives `is_asked_to_end`: once that is true, the wait ends with KeyboardInterrupt.
     """
     left_s = _await_listener(endpoint, timeout_s, is_asked_to_end or (lambda: False))
     settings = {

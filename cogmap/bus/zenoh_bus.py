@@ -38,8 +38,8 @@ class _Closable(Protocol):
 
 
 class ZenohBus:
-    """Connects to the router at `endpoint` as `agent`, until which `is_asked_to_end` may end the
-    wait, see `open_client`.
+    """Connects to the router at `endpoint` as `agent`. `is_asked_to_end` can end the wait for the
+    router, see `open_client`.
 
     Raises NoRouterError if none answers in time, and UsageError for a name that cannot be part
     of a key.

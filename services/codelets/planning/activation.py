@@ -108,19 +108,16 @@ def spread(
 ) -> Field:
     """Spread activation from `goals`, (k, 2) cells of the map; those outside are ignored.
 
-    It spreads as far as it can, or in WAVES until it arrives at the cell `until`. Whoever spreads
-    several times over one network makes its `links` once.
+    It spreads as far as it can, or in WAVES, each anew, until it arrives at the cell `until`. What
+    lies beyond the last wave has no activation then. Whoever spreads several times over one network
+    makes its `links` once.
     """
     links = links or Links(network)
     inside = goals - np.array(network.origin)
     inside = inside[((inside >= 0) & (inside < network.shape)).all(axis=1)]
-    field = Field(
-        network=network,
-        distance_m=np.full(network.shape, np.inf),
-        upward=np.full(network.weights[0].size, -1),
-    )
     if not len(inside):
-        return field
+        nowhere = np.full(network.shape, -1)
+        return Field(network, np.full(network.shape, np.inf), nowhere.ravel())
 
     waves_m = [math.inf]
     if until is not None:

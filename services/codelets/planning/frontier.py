@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from cogmap.services.codelets.planning.activation import Field
 from cogmap.services.codelets.planning.config import Config
-from cogmap.services.codelets.planning.network import Cell, with_beside
+from cogmap.services.codelets.planning.network import EIGHT, Cell, with_beside
 from cogmap.services.codelets.planning.place_cost import PlaceCosts
 
 # The constants of this module were chosen on simulated towns, by how much of them was explored.
@@ -75,7 +75,7 @@ def best_frontier(
 
     # Of each connected edge, the agent goes to the cell nearest to its middle.
     frontiers = []
-    labels, _ = ndimage.label(is_edge, np.ones((3, 3)))
+    labels, _ = ndimage.label(is_edge, EIGHT)
     for number, box in enumerate(ndimage.find_objects(labels), start=1):
         corner = np.array([side.start for side in box])
         cells = corner + np.argwhere(labels[box] == number)

@@ -21,7 +21,7 @@ from cogmap.graph.window import (
     Window,
 )
 from cogmap.schemas.nodes import PathColumn, PlaceColumn, Self
-from cogmap.services.codelets.planning.network import PlaceGrid, ends, with_beside
+from cogmap.services.codelets.planning.network import EIGHT, PlaceGrid, ends, with_beside
 
 COLUMNS = (PlaceColumn.ROAD, PlaceColumn.OBSTACLE, *WEIGHT_COLUMNS)
 POSITION = slice(PathColumn.X_M, PathColumn.Y_M + 1)
@@ -67,10 +67,6 @@ PART_FROM = 0.2
 GROUP_FROM = 3 * OBSTACLE_FROM
 """Of the sum over connected places, from which on they are an obstacle together: as much as three
 places are that count by themselves."""
-
-
-EIGHT = np.ones((3, 3), bool)
-"""Places are connected to their eight neighbours."""
 
 
 class Ground(NamedTuple):

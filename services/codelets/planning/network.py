@@ -11,6 +11,9 @@ from scipy import ndimage
 from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS
 
+EIGHT = np.ones((3, 3), bool)
+"""Connects places to their eight neighbours, as scipy.ndimage takes it."""
+
 Cell = tuple[int, int]
 Slices = tuple[slice, slice]
 
@@ -20,8 +23,7 @@ class PlaceNetwork(NamedTuple):
 
     `origin`: the cell of index [0, 0]; cell (i, j) stands at (i * cell_m, j * cell_m) in the map's
     frame. `weights`: (4, width, height), of the links to the neighbours at LINK_OFFSETS, that is
-    E, NE, N and NW; 0 is not traversable, as all that lead outside, 1 is free. Links have no
-    direction.
+    E, NE, N and NW; 0 is not traversable, 1 is free. Links have no direction.
     """
 
     origin: Cell
@@ -100,8 +102,8 @@ class PlaceGrid(NamedTuple):
         return has
 
     def minimum(self, positions_m: Floats, values: Floats) -> Singles:
-        """(w, h): the minimum of the (n,) values at (n, 2) positions in each cell, infinite where
-        there is none.
+        """Return the minimum of the (n,) values at (n, 2) positions in each cell, (w, h), infinite
+        if there is none.
         """
         cells, is_inside = self._cells(positions_m)
         minimum = np.full(self.shape, np.inf, np.float32)

@@ -93,7 +93,7 @@ def route_length(lengths: Floats, visited: Indices, *, closed: bool) -> float:
 
 
 def _units(lengths: Floats) -> Indices:
-    """`lengths` as whole numbers. Raises CogmapError where they are not symmetric and finite."""
+    """Round `lengths` to whole numbers. Raises CogmapError if they are not symmetric and finite."""
     is_square = lengths.ndim == 2 and lengths.shape[0] == lengths.shape[1]
     is_finite = bool(np.isfinite(lengths).all())
     if not is_square or not is_finite or not np.allclose(lengths, lengths.T):

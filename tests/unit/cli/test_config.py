@@ -93,6 +93,8 @@ def test_each_key_has_its_description_unit_and_range_before_it() -> None:
     text = printed("--seed", "3")
 
     assert "# Width of a camera image, in pixels. (64 to 1024)\nwidth_px = 320\n" in text
+    assert "(above 0 to 100)\ncruise_m_s" in text
+    assert "(0 to 4096 characters)\n" in text
     assert "seed = 3\n" in text
 
 

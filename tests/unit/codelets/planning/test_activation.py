@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from cogmap.geometry.arrays import Booleans, Indices
 from cogmap.graph.window import LINK_OFFSETS
-from cogmap.services.codelets.planning.activation import spread
+from cogmap.services.codelets.planning.activation import Field, spread
 from cogmap.services.codelets.planning.network import (
     Cell,
     PlaceNetwork,
@@ -33,9 +33,7 @@ def _wall(gap: int | None = None) -> Booleans:
 
 
 def _route(network: PlaceNetwork, start: Cell, goal: Cell) -> Indices:
-    route = spread(network, np.array([goal])).climb(start)
-    assert route is not None
-    return route
+    return _climbed(spread(network, np.array([goal])), start)
 
 
 def test_distance_is_octile_on_a_free_grid() -> None:
@@ -100,6 +98,35 @@ def test_the_agent_is_at_a_goal_that_has_no_links() -> None:
     free[1, 1] = True
 
     assert _route(grid_network(free), (1, 1), (1, 1)).tolist() == [[1, 1]]
+
+
+@pytest.mark.parametrize("gap", [0, 5], ids=["after a long way round", "at once"])
+def test_activation_that_spreads_until_it_reaches_the_agent_makes_the_same_route(gap: int) -> None:
+    free = np.ones((7, 60), bool)
+    free[3] = False
+    free[3, 10 * gap] = True
+    network = grid_network(free)
+    start = (2, 50)
+    goal = np.array([[4, 50]])
+
+    whole = spread(network, goal)
+    until = spread(network, goal, until=start)
+
+    assert until.distance_m[start] == whole.distance_m[start]
+    assert network.cost_m(_climbed(until, start)) == network.cost_m(_climbed(whole, start))
+
+
+def test_activation_that_has_reached_the_agent_spreads_no_farther() -> None:
+    field = spread(grid_network(np.ones((60, 5), bool)), np.array([[0, 2]]), until=(4, 2))
+
+    assert field.arrives((4, 2))
+    assert not field.arrives((50, 2))
+
+
+def _climbed(field: Field, start: Cell) -> Indices:
+    route = field.climb(start)
+    assert route is not None
+    return route
 
 
 @pytest.mark.parametrize("seed", range(5))
