@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -24,6 +25,9 @@ from tests.support.system.processes import wait_until
 TIMEOUT_S = 30.0
 NO_ROUTER = "tcp/127.0.0.1:1"
 FREE = "tcp/127.0.0.1:0"
+SYN_SENT = "02"
+"""A connection that is asked for, in /proc/net/tcp (the kernel's `TCP_SYN_SENT`)."""
+
 REFERENCE = Path(__file__).parents[1] / "replay" / "reference.mcap"
 
 
@@ -151,31 +155,49 @@ def test_whoever_finds_no_router_within_five_seconds_names_it(tmp_path: Path) ->
     assert not log.exists()
 
 
+@pytest.fixture
+def busy_port() -> Iterator[int]:
+    """A port where something listens that has no room for another connection, so that whoever
+    connects to it waits.
+    """
+    with socket.socket() as listener:
+        listener.bind(("127.0.0.1", 0))
+        listener.listen(0)
+        with socket.create_connection(listener.getsockname()):
+            yield listener.getsockname()[1]
+
+
 @pytest.mark.parametrize(
     "command",
     [
-        ["topic", "list", "--connect", NO_ROUTER],
-        ["topic", "echo", "clock", "--connect", NO_ROUTER],
-        ["graph", "--connect", NO_ROUTER],
-        ["module", "action", "--connect", NO_ROUTER],
-        ["run", "--out", "RUN", "--router", NO_ROUTER],
+        ["topic", "list", "--connect", "BUSY"],
+        ["topic", "echo", "clock", "--connect", "BUSY"],
+        ["graph", "--connect", "BUSY"],
+        ["module", "action", "--connect", "BUSY"],
+        ["run", "--out", "RUN", "--router", "BUSY"],
     ],
     ids=lambda command: command[0],
 )
 def test_ctrl_c_ends_whoever_waits_for_a_router_before_it_gives_up(
-    command: list[str], tmp_path: Path
+    command: list[str], busy_port: int, tmp_path: Path
 ) -> None:
-    process = start(*(argument.replace("RUN", str(tmp_path / "run")) for argument in command))
-    wait_until(lambda: is_waiting(process.pid), "it waits for a router")
+    values = {"BUSY": f"tcp/127.0.0.1:{busy_port}", "RUN": str(tmp_path / "run")}
+    process = start(*(values.get(argument, argument) for argument in command))
+    wait_until(lambda: is_awaited(busy_port), "it waits for a router")
     process.send_signal(signal.SIGINT)
 
     assert process.wait(TIMEOUT_S) == 130
     assert "no router" not in process.communicate()[1]
 
 
-def is_waiting(pid: int) -> bool:
-    """Whether a process has imported the client of the bus, which waits for the router next."""
-    return "zenoh" in Path(f"/proc/{pid}/maps").read_text()
+def is_awaited(port: int) -> bool:
+    """Whether a connection to `port` is asked for and not answered yet.
+
+    Python can lose a Ctrl-C that comes earlier, while a process imports its modules.
+    """
+    connections = Path("/proc/net/tcp").read_text().splitlines()[1:]
+    states = {(fields[2].split(":")[1], fields[3]) for fields in map(str.split, connections)}
+    return (f"{port:04X}", SYN_SENT) in states
 
 
 def test_a_full_disk_and_an_ascii_terminal_are_a_sentence() -> None:
