@@ -81,7 +81,7 @@ def _with_objects(
     their label is taken, perhaps by what is seen right now, or one of their look is at that place.
     """
     graph = ledger.graph
-    taken = {each.id for each in entering if isinstance(each, GraphNode)} | graph.nodes.keys()
+    entered = {each.id for each in entering if isinstance(each, GraphNode)}
     present: list[Object] | None = None
     accepted: list[Operation] = []
     for operation in operations:
@@ -91,12 +91,13 @@ def _with_objects(
 
         if present is None:
             present = list(graph.of_kind(Object))
-        has_label = {operation.id, percept_id(operation.label)} & taken
-        if has_label or is_among(operation, present):
+        labels = (operation.id, percept_id(operation.label))
+        is_taken = any(label in entered or label in graph.nodes for label in labels)
+        if is_taken or is_among(operation, present):
             ledger.reject(f"an offer of {operation.id}: it is on the map already")
             continue
 
-        taken.add(operation.id)
+        entered.add(operation.id)
         present.append(operation)
         place = nearest_place(
             operation.x_m, operation.y_m, graph.cell_m(operation.map), operation.map

@@ -89,11 +89,16 @@ CODELET = Codelet(
 
 def _unexplained(agent: Self, graph: Graph) -> list[str]:
     """Return the functions that ease a need now, if no object nearby has them."""
+    eased = [SATISFIED_BY.get(need.label, "") for need in graph.of_kind(Need) if need.is_eased]
+    functions = [function for function in eased if function]
+    # Few needs are ever eased, and a map may have many objects.
+    if not functions:
+        return []
+
     here_m = (agent.x_m, agent.y_m)
     near = set()
     for node in graph.of_kind(Object):
         if node.map == agent.map and math.dist((node.x_m, node.y_m), here_m) <= SAME_M:
             near.add(node.function)
 
-    eased = [SATISFIED_BY.get(need.label, "") for need in graph.of_kind(Need) if need.is_eased]
-    return [function for function in eased if function and function not in near]
+    return [function for function in functions if function not in near]
