@@ -119,6 +119,7 @@ def metrics(towns: list[Town]) -> Metrics:
             [each for each in reached if not each.closed]
         ),
         "unwarned_over_shortest": _mean([each.unwarned_m / each.shortest_m for each in reached]),
+        "way_over_unwarned": _mean([each.over_unwarned for each in reached]),
         "boundary_precision": float(np.mean([town.boundaries.precision for town in towns])),
         "boundary_recall": float(np.mean([town.boundaries.recall for town in towns])),
         "collisions": float(sum(town.collisions for town in towns)),

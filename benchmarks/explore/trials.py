@@ -60,6 +60,14 @@ class Trial:
         assert self.driven_m is not None
         return self.driven_m / self.shortest_m
 
+    @property
+    def over_unwarned(self) -> float:
+        """Return the distance driven over that of an agent that knows the town, but not which
+        street was closed or opened, before it sees that.
+        """
+        assert self.driven_m is not None
+        return self.driven_m / self.unwarned_m
+
     def close(self, closure: Closure) -> None:
         """Note that the street on the way is closed."""
         self.closed = closure.street

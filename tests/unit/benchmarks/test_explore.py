@@ -175,4 +175,5 @@ def test_goals_that_are_not_reached_count_and_do_not_lengthen_the_way() -> None:
     assert found["way_over_shortest"] == pytest.approx(1.15)
     assert found["way_over_shortest_open"] == pytest.approx(1.1)
     assert found["unwarned_over_shortest"] == pytest.approx(1.1)
+    assert found["way_over_unwarned"] == pytest.approx(1.05)
     assert found["collisions"] == 1.0
