@@ -116,7 +116,9 @@ class ObjectRecognizer:
         self._prototypes = prototypes
         self._directions = np.asarray(prototypes.directions, np.float32)
 
-        self._labels: list[str] = []
+        # Of each learned label, its number among these; and of each embedding that of its label.
+        self._number_of: dict[str, int] = {}
+        self._numbers = np.empty(0, np.int64)
         self._embeddings = np.empty((0, DIMENSIONS), np.float32)
 
     def begin(
@@ -150,7 +152,7 @@ class ObjectRecognizer:
     @property
     def labels(self) -> list[str]:
         """Return all labels that a segment may be recognized as: taught ones, then learned ones."""
-        return [*self._prototypes.names, *dict.fromkeys(self._labels)]
+        return [*self._prototypes.names, *self._number_of]
 
     def is_taught(self, label: str) -> bool:
         """Return true if the label was taught, not learned since."""
@@ -171,10 +173,8 @@ class ObjectRecognizer:
         taught = len(self._prototypes.names)
 
         # The cosine with a learned label is that with its most similar embedding.
-        novel = labels[taught:]
-        novel_cosines = np.full(len(novel), np.float32(-1.0))
-        rows = [novel.index(label) for label in self._labels]
-        np.maximum.at(novel_cosines, rows, self._embeddings @ appearance.embedding)
+        novel_cosines = np.full(len(self._number_of), np.float32(-1.0))
+        np.maximum.at(novel_cosines, self._numbers, self._embeddings @ appearance.embedding)
 
         is_excluded = np.array([label in excluded for label in labels])
         log_odds = _log_odds(
@@ -203,7 +203,8 @@ class ObjectRecognizer:
 
     def learn(self, label: str, embedding: Singles) -> None:
         """Recognize from now on what is similar to `embedding` as `label`."""
-        self._labels.append(label)
+        number = self._number_of.setdefault(label, len(self._number_of))
+        self._numbers = np.append(self._numbers, number)
         self._embeddings = np.concatenate([self._embeddings, embedding[None]])
 
     def is_new_appearance(self, recognition: Recognition) -> bool:
@@ -211,7 +212,8 @@ class ObjectRecognizer:
         and has fewer than MAX_APPEARANCES.
         """
         embedding = recognition.appearance.embedding
-        cosines = [known @ embedding for label, known in self.learned if label == recognition.label]
+        number = self._number_of.get(recognition.label, -1)
+        cosines = [known @ embedding for known in self._embeddings[self._numbers == number]]
         return 0 < len(cosines) < MAX_APPEARANCES and bool(max(cosines) < SAME_COSINE)
 
     @property
@@ -222,7 +224,9 @@ class ObjectRecognizer:
     @property
     def learned(self) -> list[tuple[str, Singles]]:
         """Return every label and embedding learned since the teaching, in order."""
-        return list(zip(self._labels, self._embeddings, strict=True))
+        labels = list(self._number_of)
+        names = [labels[number] for number in self._numbers.tolist()]
+        return list(zip(names, self._embeddings, strict=True))
 
 
 def load(path: Path = DEFAULT_PATH, processor: Processor = "cpu") -> ObjectRecognizer:
