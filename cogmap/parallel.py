@@ -21,7 +21,8 @@ def parallel_map(
     processes: int,
     progress: Progress = lambda share: None,
 ) -> list[Result]:
-    """Return `work` of every job, in the order of `jobs`; `progress` is called with the share done.
+    """Return `work` of every job, in the order of `jobs`; `progress` is called with the share done
+    as each of them ends.
 
     `work` and the jobs are pickled, arrays of any size too. One process, or one job, runs in the
     calling process.
@@ -36,15 +37,20 @@ def parallel_map(
         max_nbytes=None,
         initializer=_end_with,
         initargs=(os.getpid(),),
-        return_as="generator",
+        return_as="generator_unordered",
     )
-    results: list[Result] = []
+    results: dict[int, Result] = {}
 
-    for result in pool(delayed(work)(job) for job in jobs):
-        results.append(result)
+    for number, result in pool(delayed(_numbered)(work, *job) for job in enumerate(jobs)):
+        results[number] = result
         progress(len(results) / len(jobs))
 
-    return results
+    return [results[number] for number in range(len(jobs))]
+
+
+def _numbered(work: Callable[[Job], Result], number: int, job: Job) -> tuple[int, Result]:
+    """Return the number of a job with its result: the shortest job ends first."""
+    return number, work(job)
 
 
 def end_workers() -> None:

@@ -49,6 +49,26 @@ def test_results_come_in_the_order_of_the_jobs_and_progress_reaches_one() -> Non
     assert shares == sorted(shares)
 
 
+def _await(ended: Path | None) -> bool:
+    """Wait for a file, if one is given."""
+    deadline_s = time.monotonic() + 30
+    while ended is not None and not ended.exists():
+        assert time.monotonic() < deadline_s
+    return ended is None
+
+
+def test_progress_follows_each_job_that_ends_before_an_earlier_one(tmp_path: Path) -> None:
+    ended = tmp_path / "ended"
+    shares: list[float] = []
+
+    def progress(share: float) -> None:
+        shares.append(share)
+        ended.touch()
+
+    assert parallel_map(_await, [ended, None], 2, progress) == [False, True]
+    assert shares == [0.5, 1.0]
+
+
 def test_nothing_is_left_of_the_processes_of_one_that_is_killed(tmp_path: Path) -> None:
     script = tmp_path / "slow.py"
     script.write_text(SLOW)
