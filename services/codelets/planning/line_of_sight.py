@@ -35,10 +35,9 @@ def straightened(route: Indices, cost: Singles, is_clear: Booleans, origin: Cell
     dearer = np.maximum(cost[tuple(inside[:-1].T)], cost[tuple(inside[1:].T)])
     spent = np.concatenate([[0.0], np.cumsum(steps * dearer)])
 
-    line_cost = np.where(is_clear, cost, np.inf)
     bends = [0]
     while bends[-1] < len(inside) - 1:
-        bends.append(_farthest(inside, spent, line_cost, bends[-1]))
+        bends.append(_farthest(inside, spent, cost, is_clear, bends[-1]))
 
     starts = inside[bends[:-1]]
     ends = inside[bends[1:]]
@@ -67,7 +66,7 @@ def straight(starts: Indices, ends: Indices) -> tuple[Indices, Indices]:
     return cells, steps
 
 
-def _farthest(route: Indices, spent: Floats, cost: Singles, at: int) -> int:
+def _farthest(route: Indices, spent: Floats, cost: Singles, is_clear: Booleans, at: int) -> int:
     """Return the number of the last cell of a route before one to which a line from number `at` is
     dearer than the route; that of the next cell in any case.
     """
@@ -75,7 +74,7 @@ def _farthest(route: Indices, spent: Floats, cost: Singles, at: int) -> int:
     first = at + 2
     while first <= last:
         chosen = np.arange(first, min(first + _AT_ONCE, last + 1))
-        line_cost = _costs(route[at : at + 1], route[chosen], cost)
+        line_cost = _costs(route[at : at + 1], route[chosen], cost, is_clear)
         is_dearer = line_cost > spent[chosen] - spent[at] + 1e-9
         if is_dearer.any():
             return max(int(chosen[is_dearer.argmax()]) - 1, at + 1)
@@ -84,14 +83,14 @@ def _farthest(route: Indices, spent: Floats, cost: Singles, at: int) -> int:
     return max(last, at + 1)
 
 
-def _costs(start: Indices, ends: Indices, cost: Singles) -> Floats:
+def _costs(start: Indices, ends: Indices, cost: Singles, is_clear: Booleans) -> Floats:
     """Return the (m,) costs of straight lines from (1, 2) to each of (m, 2), infinite for one that
-    passes a blocked place, or between two of which one is.
+    passes a place that is not clear, or between two of which one is blocked.
     """
     cells, steps = straight(start, ends)
     i = cells[..., 0]
     j = cells[..., 1]
-    on = cost[i, j]
+    on = np.where(is_clear[i, j], cost[i, j], np.inf)
     dearer = np.maximum(on[:, 1:], on[:, :-1])
     is_corner = np.isinf(cost[i[:, 1:], j[:, :-1]]) | np.isinf(cost[i[:, :-1], j[:, 1:]])
 

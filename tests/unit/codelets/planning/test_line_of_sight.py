@@ -93,6 +93,18 @@ def test_a_line_beside_what_stands_there_is_not_taken() -> None:
     assert straightened(_bent(), CLEAR, is_clear, (0, 0)).tolist() == _bent().tolist()
 
 
+def test_a_line_passes_diagonally_beside_free_places_that_are_not_clear() -> None:
+    route = np.array([(0, 0), (1, 0), (2, 1), (3, 2), (4, 3)])
+    is_clear = np.zeros(CLEAR.shape, bool)
+    is_clear[tuple(route.T)] = True
+    for end in range(2, len(route)):
+        cells, _ = straight(route[:1], route[end : end + 1])
+        is_clear[tuple(cells[0].T)] = True
+    assert not is_clear[4, 2]
+
+    assert _aside(straightened(route, CLEAR, is_clear, (0, 0))) < 0.02
+
+
 def test_a_route_is_straightened_wherever_its_ground_begins() -> None:
     origin = np.array([-7, 12])
     route = straightened(_bent() + origin, CLEAR, np.isfinite(CLEAR), (-7, 12))
