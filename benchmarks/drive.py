@@ -90,9 +90,19 @@ def drive(
     with fork_server() as server:
         choices = Choices(laps=laps)
         sections = effective(settings or {}, choices, observer=True)
-        run = Drive(folder, free_endpoint(), "agent", choices, sections, began_s, server)
+        run = Drive(
+            folder,
+            free_endpoint(),
+            "agent",
+            choices,
+            sections,
+            began_s=began_s,
+            limit_s=TIMEOUT_S,
+            limits_start=True,
+            server=server,
+        )
         try:
-            watch, ending = run.run(began_s + TIMEOUT_S, stop, stop)
+            watch, ending = run.run(stop, stop)
         finally:
             stop.close()
 

@@ -39,12 +39,17 @@ GRACE_S = 3.0
 QUIET_S = 0.3
 MAX_SHARE_SLOWED = 0.3
 MAX_NAMES = 8
+FINISH_S = 4.0
+FIRST_POSE = "first pose"
 
 
 @dataclass
 class Drive:
     """A run in `folder`, which holds its files, of the modules as configured in `sections`, at the
     router `endpoint`. Where there is a `server`, it forks them.
+
+    It may take `limit_s` of wall-clock time from `began_s` on or, unless `limits_start`, from its
+    first pose on: then a slow start takes nothing from the drive.
     """
 
     folder: Path
@@ -53,6 +58,8 @@ class Drive:
     choices: Choices
     sections: Sections
     began_s: float
+    limit_s: float
+    limits_start: bool
     server: ForkServer | None = None
     start_s: dict[str, float] = field(default_factory=dict)
 
@@ -69,9 +76,9 @@ class Drive:
         participants: dict[str, int] = self.sections["run"]["participants"]
         return participants
 
-    def run(self, until_s: float, stop: Stop, display: Display) -> tuple[Watch, Ending]:
+    def run(self, stop: Stop, display: Display) -> tuple[Watch, Ending]:
         """Drive until every goal is reached, the time of the drive is over, it cannot succeed,
-        `until_s` on the monotonic clock has come, or `stop` was asked; then end every process.
+        its time limit has come, or `stop` was asked; then end every process.
 
         Raises ProcessFailedError, with its last words, if a process failed before the drive had
         begun, and KeyboardInterrupt if `stop` was asked before a router answered.
@@ -84,18 +91,25 @@ class Drive:
                 self.supervisor.start(program)
             self._note("processes started")
             watch = Watch(ZenohBus(self.endpoint, self.agent, lambda: stop.asked))
-            ending = self._drive(watch, until_s, stop, display)
+            ending = self._drive(watch, stop, display)
         finally:
             self._close(watch)
         return watch, ending
 
-    def _drive(self, watch: Watch, until_s: float, stop: Stop, display: Display) -> Ending:
+    def is_over_limit(self) -> bool:
+        """Return whether only the time to end it is left of its time limit."""
+        counted_from_s = self.began_s
+        if not self.limits_start:
+            counted_from_s += self.start_s.get(FIRST_POSE, 0.0)
+        return time.monotonic() >= counted_from_s + self.limit_s - FINISH_S
+
+    def _drive(self, watch: Watch, stop: Stop, display: Display) -> Ending:
         observer = watch.tally.observer
         try:
-            ending = self._await_recorder(watch, until_s, stop)
+            ending = self._await_recorder(watch, stop)
             if ending is None:
                 self.supervisor.release()
-                ending = self._follow(watch, until_s, stop, display)
+                ending = self._follow(watch, stop, display)
         except ProcessFailedError as error:
             if observer.start is None:
                 raise
@@ -105,28 +119,28 @@ class Drive:
             watch.pump_until_quiet(QUIET_S)
         return ending
 
-    def _await_recorder(self, watch: Watch, until_s: float, stop: Stop) -> Ending | None:
+    def _await_recorder(self, watch: Watch, stop: Stop) -> Ending | None:
         """Wait for it, so that the log holds every message of each module from its first on.
 
         Returns how the drive ended meanwhile, if it did.
         """
         recorders = {RECORDER: 1} if self.choices.record else {}
         while missing := watch.missing(recorders):
-            ending = self._ending(watch, missing, until_s, stop)
+            ending = self._ending(watch, missing, stop)
             if ending is not None:
                 return ending
             watch.pump(PUMP_S)
             self.supervisor.check()
         return None
 
-    def _follow(self, watch: Watch, until_s: float, stop: Stop, display: Display) -> Ending:
+    def _follow(self, watch: Watch, stop: Stop, display: Display) -> Ending:
         """Guide the agent, restart what dies and show the progress until the drive must end."""
         tally = watch.tally
         observer = tally.observer
         show_s = 0.0
         shown: Stage | None = None
         missing = watch.missing(self.participants)
-        while (ending := self._ending(watch, missing, until_s, stop)) is None:
+        while (ending := self._ending(watch, missing, stop)) is None:
             watch.pump(PUMP_S)
             if self.guide is not None:
                 for message in self.guide.step(observer, tally.replica.graph):
@@ -137,7 +151,7 @@ class Drive:
             if not missing:
                 self._note("all ready")
             if observer.start is not None:
-                self._note("first pose")
+                self._note(FIRST_POSE)
             if tally.cycle_ms:
                 self._note("first command")
 
@@ -158,9 +172,7 @@ class Drive:
         elapsed_s = time.monotonic() - self.began_s
         self.start_s.setdefault(milestone, round(elapsed_s, 3))
 
-    def _ending(
-        self, watch: Watch, missing: list[str], until_s: float, stop: Stop
-    ) -> Ending | None:
+    def _ending(self, watch: Watch, missing: list[str], stop: Stop) -> Ending | None:
         """Decide how the drive must end now; None while it continues."""
         tally = watch.tally
         observer = tally.observer
@@ -170,7 +182,7 @@ class Drive:
             return Ending(Outcome.ROUTE_COMPLETE, self.guide.sentence)
         if observer.has_ended:
             return self._ending_of_simulation(observer)
-        if time.monotonic() >= until_s:
+        if self.is_over_limit():
             return _out_of_time(tally, missing)
         if observer.start is None:
             return None

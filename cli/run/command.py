@@ -55,7 +55,7 @@ from cogmap.services import registry
     type=FiniteRange(5, 1e6),
     metavar="SECONDS",
     help="End after this much time, start and end included.  "
-    f"[default: {LAP_LIMIT_S:g} for each lap]",
+    f"[default: {LAP_LIMIT_S:g} for each lap, start excluded]",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the summary as JSON.")
 @click.option(

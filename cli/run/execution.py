@@ -28,7 +28,6 @@ from cogmap.runtime.process import Stop
 from cogmap.services.sim.layout.towns import BLOCKS, LOOP, OSM
 
 RUNS = Path("runs")
-FINISH_S = 4.0
 
 
 @dataclass(frozen=True)
@@ -60,13 +59,22 @@ def run_drive(start: Start, server: ForkServer | None) -> int:
         check_free(start.endpoint)
 
     folder = _new_folder(start.out)
-    drive = Drive(folder, start.endpoint, start.agent, choices, sections, BEGAN_S, server)
-    limit_s = start.time_limit_s or default_limit_s(sections["sim"], choices)
+    drive = Drive(
+        folder,
+        start.endpoint,
+        start.agent,
+        choices,
+        sections,
+        began_s=BEGAN_S,
+        limit_s=start.time_limit_s or default_limit_s(sections["sim"], choices),
+        limits_start=start.time_limit_s is not None,
+        server=server,
+    )
     screen = display_on(console)
     _introduce(screen, drive)
     with _writing(folder):
         try:
-            watch, ending = drive.run(BEGAN_S + limit_s - FINISH_S, stop, screen)
+            watch, ending = drive.run(stop, screen)
         finally:
             screen.close()
         metrics = summary.finish(drive, watch, ending)
@@ -79,10 +87,10 @@ def run_drive(start: Start, server: ForkServer | None) -> int:
 
 
 def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
-    """Return the time limit of a drive with these settings of the simulation.
+    """Return how long a drive with these settings of the simulation may take once it has begun.
 
     It grows with each lap, and is one lap's at least; without laps it is the drive's duration, and
-    time to start and to end.
+    time to end.
     """
     has_laps = not (choices.tour or choices.goals or choices.explore_s)
     if sim["town"] == LOOP and has_laps:

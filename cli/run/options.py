@@ -9,9 +9,9 @@ import click
 from cogmap.cli.options import FiniteRange
 
 LAP_LIMIT_S = 85.0
-"""The wall-clock time that a lap may take, start and end included; it takes some 60 s."""
+"""The wall-clock time that a lap may take, its end included; it takes some 60 s."""
 AROUND_S = 30.0
-"""The wall-clock time that a drive may take to start and to end."""
+"""The wall-clock time that a drive may take to end, or to lag behind its own time."""
 
 seed_option = click.option(
     "--seed", type=click.IntRange(0, 2**32), help="Seed of the town and of all noise.  [default: 1]"

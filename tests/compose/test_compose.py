@@ -45,8 +45,8 @@ class Compose:
         """Run it, which must succeed, and return what it prints."""
         done = self.attempt(*arguments)
         command = " ".join(done.args)
-        output = done.stdout + done.stderr
-        assert done.returncode == 0, f"{command}:\n{output[-3000:]}"
+        ends = f"{done.stderr[-3000:]}\n{done.stdout[-3000:]}"
+        assert done.returncode == 0, f"{command}:\n{ends}"
         return done.stdout
 
     def attempt(self, *arguments: str) -> subprocess.CompletedProcess[str]:
@@ -96,6 +96,23 @@ def image() -> None:
     if os.environ.get("CI") == "true":
         pytest.fail(missing)
     pytest.skip(missing)
+
+
+def test_a_drive_ends_every_container_and_leaves_its_files(image: None, tmp_path: Path) -> None:
+    in_lockstep = "--town blocks --explore 8 --lockstep --time-limit 300"
+    project = Compose("short", drive=in_lockstep)
+    try:
+        output = project("up", "--no-color", "--exit-code-from", "drive")
+        project("cp", f"drive:{RUN}/.", str(tmp_path))
+        assert project("ps", "--quiet", "--status", "running") == ""
+    finally:
+        project("down", "--volumes", "--timeout", "5")
+
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert "route complete" in output
+    assert summary["completed"]
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+    assert Recording.read(tmp_path / "log.mcap") is not None
 
 
 @pytest.fixture(scope="module")
@@ -199,22 +216,6 @@ def test_when_recording_has_ended_the_doctor_misses_nobody(watch: Watch, compose
 
     missed = [finding["about"] for finding in findings if "no instance" in finding["wrong"]]
     assert not missed, findings
-
-
-def test_a_drive_ends_every_container_and_leaves_its_files(image: None, tmp_path: Path) -> None:
-    project = Compose("short", drive="--town blocks --explore 8")
-    try:
-        output = project("up", "--no-color", "--exit-code-from", "drive")
-        project("cp", f"drive:{RUN}/.", str(tmp_path))
-        assert project("ps", "--quiet", "--status", "running") == ""
-    finally:
-        project("down", "--volumes", "--timeout", "5")
-
-    summary = json.loads((tmp_path / "summary.json").read_text())
-    assert "route complete" in output
-    assert summary["completed"]
-    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
-    assert Recording.read(tmp_path / "log.mcap") is not None
 
 
 def test_the_image_has_the_experiments(image: None) -> None:
