@@ -18,6 +18,7 @@ from benchmarks.explore.drivable import Drivable
 from benchmarks.explore.trials import Point, draw_goal
 from benchmarks.harness import COGNITION, TownObserver, build, running, town_sections
 from benchmarks.report import Metrics
+from cogmap.cli.progress import bar
 from cogmap.geometry.polylines import nearest_on_line, resample
 from cogmap.parallel import parallel_map
 from cogmap.runtime.module import Module
@@ -197,7 +198,10 @@ def guidance(processes: int) -> Metrics:
     """Measure the share of routes whose end the agent reaches by guidance schemes alone, within
     GUIDED_WITHIN_M and without running into anything, and further figures of the routes.
     """
-    driven = parallel_map(drive_twice, list(range(FIRST_SEED, FIRST_SEED + ROUTES)), processes)
+    seeds = list(range(FIRST_SEED, FIRST_SEED + ROUTES))
+    with bar("guided routes") as progress:
+        driven = parallel_map(drive_twice, seeds, processes, progress)
+
     guided = [route for route in driven if route.is_guided]
     return {
         "guided_share": len(guided) / len(driven),

@@ -17,6 +17,7 @@ from benchmarks.drive import drive
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most, within
 from cogmap.cli.files import LOG_NAME
+from cogmap.cli.progress import bar
 from cogmap.parallel import parallel_map
 from cogmap.recording.storage.reader import LogReader, Record
 from cogmap.schemas.topics import ACTION, BROADCAST, Topic
@@ -74,7 +75,9 @@ def survival(processes: int, towns: int = TOWNS) -> Metrics:
     for seed in range(FIRST_SEED, FIRST_SEED + towns):
         stays += [Stay(seed), Stay(seed, at_random=True)]
 
-    with_cameras, *lives = parallel_map(lived, stays, processes)
+    with bar("lives") as progress:
+        with_cameras, *lives = parallel_map(lived, stays, processes, progress)
+
     own = lives[::2]
     return {
         "survived_share": _survived(own),

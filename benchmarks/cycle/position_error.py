@@ -14,6 +14,7 @@ from benchmarks.harness import build, running
 from benchmarks.report import Metrics
 from cogmap.cli.launch.observer import OBSERVED, Observer
 from cogmap.cli.launch.plan import OBSERVER, Choices, effective
+from cogmap.cli.progress import bar
 from cogmap.errors import CogmapError
 from cogmap.parallel import parallel_map
 from cogmap.runtime.module import Module
@@ -25,7 +26,10 @@ LAPS = 3.0
 
 def over_fused(processes: int) -> Metrics:
     """Measure `error_over_fused`, the mean of the towns' ratios, and the errors behind it."""
-    rows = parallel_map(partial(mean_errors_m, laps=LAPS), TOWNS, processes)
+    with bar("laps") as progress:
+        work = partial(mean_errors_m, laps=LAPS)
+        rows = parallel_map(work, TOWNS, processes, progress)
+
     estimate_m, fused_m, wheels_m = np.array(rows).T
     ratios = estimate_m / fused_m
 

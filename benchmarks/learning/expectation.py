@@ -21,6 +21,7 @@ from benchmarks.harness import (
 )
 from benchmarks.learning.visibility import Visibility
 from benchmarks.report import Metrics
+from cogmap.cli.progress import bar
 from cogmap.parallel import parallel_map
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
@@ -94,7 +95,10 @@ class Surprises:
 
 def measure(processes: int) -> Metrics:
     """Measure the share of surprises that were conscious in time, over so many towns."""
-    found = parallel_map(surprises_in, list(range(FIRST_SEED, FIRST_SEED + TOWNS)), processes)
+    seeds = list(range(FIRST_SEED, FIRST_SEED + TOWNS))
+    with bar("towns that change") as progress:
+        found = parallel_map(surprises_in, seeds, processes, progress)
+
     buildings = [each for town in found for each in town.buildings]
     streets = [each for town in found for each in town.streets]
     return {

@@ -16,6 +16,7 @@ from benchmarks.perception.objects import claims, sight
 from benchmarks.perception.pipeline import SensoryPipeline
 from benchmarks.perception.scenes import FIRST_SEED, Scene, drawn, side_and_range
 from benchmarks.report import Metrics
+from cogmap.cli.progress import bar
 from cogmap.geometry.arrays import Bytes
 from cogmap.parallel import parallel_map
 from cogmap.runtime.module import Module
@@ -56,10 +57,10 @@ class Naming:
 
 def measure(processes: int) -> Metrics:
     """Measure the gain by priming on ambiguous views, and on all."""
-    found: list[Naming] = []
-    for namings in parallel_map(namings_in, list(SEEDS), processes):
-        found += namings
+    with bar("naming buildings") as progress:
+        towns = parallel_map(namings_in, list(SEEDS), processes, progress)
 
+    found = [naming for namings in towns for naming in namings]
     ambiguous = [naming for naming in found if not naming.is_sure]
     return {
         "priming_gain": _gain(ambiguous),

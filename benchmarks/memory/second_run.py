@@ -21,6 +21,7 @@ from benchmarks.harness import (
     town_sections,
 )
 from benchmarks.report import Metrics
+from cogmap.cli.progress import bar
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose, relative
 from cogmap.parallel import parallel_map
@@ -171,7 +172,8 @@ def measure(processes: int) -> Metrics:
     """
     seeds = list(range(FIRST_SEED, FIRST_SEED + TOWNS))
     learning = [Visit(seed, FIRST_START, (), LEARN_S) for seed in seeds]
-    first = parallel_map(visit, learning, processes)
+    with bar("first runs") as progress:
+        first = parallel_map(visit, learning, processes, progress)
 
     later = []
     for number, seed in enumerate(seeds):
@@ -181,7 +183,9 @@ def measure(processes: int) -> Metrics:
         strange = [record for records in others for record in records]
         later.append(Visit(seed, SECOND_START, strange, LEARN_S))
 
-    drives = parallel_map(visit, later, processes)
+    with bar("second runs") as progress:
+        drives = parallel_map(visit, later, processes, progress)
+
     own, strange_drives = drives[::2], drives[1::2]
     shares = []
     are_right = []
