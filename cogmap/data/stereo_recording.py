@@ -1,0 +1,84 @@
+"""A stereo camera's recording in files: its calibration, and a pair of pictures for each stamp."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from cogmap.data.text import read_bytes
+from cogmap.errors import UsageError
+from cogmap.geometry.arrays import Bytes, Floats, Indices
+from cogmap.schemas.sensing import Calibration
+
+GIVE = "the picture that the camera took"
+REMEDY = "copy it again, or leave this pair out"
+
+
+@dataclass(frozen=True)
+class StereoRecording:
+    """The pairs of a camera, in order of time.
+
+    `stamps_ns`: int64 (n,), of one clock. `true_poses`: float64 (n, 3), x_m forward, y_m left and
+    heading_rad of the left camera in the plane, from the first pose on; None if nobody measured
+    them. They are for evaluation only. `left` and `right` are n files each.
+    """
+
+    name: str
+    calibration: Calibration
+    stamps_ns: Indices
+    true_poses: Floats | None
+    left: list[Path]
+    right: list[Path]
+
+    def __len__(self) -> int:
+        """Return how many pairs it has."""
+        return len(self.stamps_ns)
+
+    def pair(self, number: int) -> tuple[Bytes, Bytes]:
+        """Return the left and the right picture of a pair, each uint8 (h, w), or RGB (h, w, 3).
+
+        Raises UsageError if one of them is missing, broken or not of the calibration's size.
+        """
+        size = (self.calibration.height_px, self.calibration.width_px)
+        pair = (picture(self.left[number]), picture(self.right[number]))
+        for path, image in zip((self.left[number], self.right[number]), pair, strict=True):
+            if image.shape[:2] != size:
+                raise UsageError(
+                    f"{path} is {image.shape[1]} x {image.shape[0]}, the camera's pictures are "
+                    f"{size[1]} x {size[0]}: give every picture in one size, left and right"
+                )
+        return pair
+
+
+def picture(path: Path) -> Bytes:
+    """Return a picture, uint8 (h, w) if it is grey, else RGB (h, w, 3). Raises UsageError if it is
+    missing or broken.
+    """
+    content = np.frombuffer(read_bytes(path, GIVE), np.uint8)
+    try:
+        image = cv2.imdecode(content, cv2.IMREAD_ANYCOLOR) if content.size else None
+    except cv2.error:
+        image = None
+    if image is None:
+        raise UsageError(f"{path} is no whole picture: {REMEDY}")
+    if image.ndim == 3:
+        image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+    return image.astype(np.uint8, copy=False)
+
+
+def checked_stamps(stamps_ns: Indices, source: Path) -> Indices:
+    """Return stamps, int64 (n,), of pairs. Raises UsageError if there is none, or one goes back."""
+    if not len(stamps_ns):
+        raise UsageError(f"{source} has no pair of pictures: give a recording with some")
+
+    backwards = np.flatnonzero(np.diff(stamps_ns) <= 0)
+    if backwards.size:
+        number = int(backwards[0]) + 1
+        raise UsageError(
+            f"{source}: the stamp of pair {number} is not after that of the pair before: give "
+            "stamps of one clock, in order of time"
+        )
+    return stamps_ns
