@@ -37,8 +37,8 @@ class Calibration(Part, kw_only=True, frozen=True):
 
 
 class StereoFrame(Message, kw_only=True, frozen=True):
-    """A pair of RGB images, uint8 (height, width, 3), as the cameras gave them. `frame` counts from
-    0.
+    """A pair of images, uint8, grey (height, width) or RGB (height, width, 3), as the cameras gave
+    them. `frame` counts from 0.
     """
 
     frame: Count

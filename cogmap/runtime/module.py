@@ -35,7 +35,8 @@ class Module:
     It has no clock, no bus, no thread and no file: the shell around it has. `name` is what it is,
     `instance` which one of them. A handler returns what to publish: None, a message, or several; of
     an iterator each message is published before the next is asked for. A message without sense
-    makes it raise MessageError, before it has changed anything.
+    makes it raise MessageError, before it has changed anything. `notes` returns what its health
+    reports in words: what is wrong with what it receives.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Module:
     remembers: bool = False
     graph: Graph | None = None
     on_load: Callable[[], Reply] | None = None
+    notes: Callable[[], list[str]] | None = None
     _next_seq: Counter[Topic] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:

@@ -154,6 +154,8 @@ class Shell:
         notes = [] if self._follower is None else self._follower.notes()
         if self.meter.faults:
             notes.append(f"{self.meter.faults} faults: run with --verbose to see them")
+        if self.module.notes is not None:
+            notes.extend(self.module.notes())
         return notes
 
     @property

@@ -6,17 +6,38 @@ from typing import Annotated
 
 import msgspec
 
-from cogmap.robot import NEAREST_DEPTH_M
 from cogmap.schemas.base import Share
+from cogmap.services.sensory.self_motion import Source
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Depth from stereo, and the noise of the wheels (paper §5.4)."""
+    """Depth from stereo, self-motion, and the noise of the wheels (paper §5.4)."""
 
+    self_motion: Annotated[
+        Source,
+        msgspec.Meta(
+            description="What measures self-motion: the wheels alone, the views alone (no odometry "
+            "is waited for), or both, each as far as the other bears it out."
+        ),
+    ] = Source.BOTH
+    max_pixels: Annotated[
+        int,
+        msgspec.Meta(
+            ge=10_000,
+            le=10_000_000,
+            description="Most pixels of a view: larger images are made smaller, with their "
+            "calibration. The time of a view grows with them.",
+        ),
+    ] = 120_000
     nearest_m: Annotated[
         float,
-        msgspec.Meta(ge=0.1, le=100, description="Least depth that stereo matching finds, in m."),
-    ] = NEAREST_DEPTH_M
+        msgspec.Meta(
+            ge=0,
+            le=100,
+            description="Least depth that stereo matching finds, in m. 0 is as near as disparities "
+            "of 15 % of the width allow: 2.2 m with the town's camera.",
+        ),
+    ] = 0.0
     speed_noise: Annotated[
         Share,
         msgspec.Meta(description="Standard deviation of the factor on the wheels' speed."),

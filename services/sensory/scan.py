@@ -16,9 +16,15 @@ MAX_HEIGHT_M = 2.0
 MIN_OBSTACLE_PIXELS = 3
 
 
-def scan(depth_m: Singles, calibration: Calibration, sectors: int) -> tuple[Singles, Singles]:
+# A sector's angle, 2.3 degrees, and how many there may be.
+SECTOR_RAD = math.radians(75) / 32
+MIN_SECTORS = 8
+MAX_SECTORS = 128
+
+
+def scan(depth_m: Singles, calibration: Calibration) -> tuple[Singles, Singles]:
     """Return bearing (left positive) and range of the nearest obstacle in each sector, float32
-    (sectors,); range 0 is none.
+    (sectors,), as many as the camera's field of view has; range 0 is none.
 
     Of each image column its third-nearest pixel counts that shows an obstacle. Bearing and range
     are from the robot's origin.
@@ -42,6 +48,7 @@ def scan(depth_m: Singles, calibration: Calibration, sectors: int) -> tuple[Sing
 
     right_px = calibration.width_px - calibration.cx_px
     half_rad = math.atan(max(calibration.cx_px, right_px) / calibration.fx_px)
+    sectors = min(max(MIN_SECTORS, round(2 * half_rad / SECTOR_RAD)), MAX_SECTORS)
     sector_rad = 2 * half_rad / sectors
     from_left = np.floor((half_rad - bearing_rad) / sector_rad)
     sector = from_left.astype(np.int64).clip(0, sectors - 1)

@@ -1,230 +1,234 @@
-"""Visual odometry: the robot's distance and turn between two views.
+"""Visual odometry: the robot's motion between two views, and the error of the camera's disparities.
 
-The last view is redrawn as it should look now, by the depth of the new view and the wheels' motion.
-Corners are tracked between the two, which look alike, so that no patch is stretched by coming
-nearer. The planar motion that explains the corners' positions in the last view is then solved for,
-with the wheels' as its prior (robust Gauss-Newton).
+Corners of the new view, with their depth, are tracked to where the last view showed them. The rigid
+motion that explains that is solved for.
+
+A right camera that looks beside where its calibration says shifts all disparities alike: as the
+robot moves, near and far things then contradict each other. That offset is estimated besides.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-import cv2
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
+from cogmap.geometry.arrays import Bytes, Floats, Singles
 from cogmap.schemas.sensing import Calibration
-from cogmap.services.sensory.reprojection import Points, points_at, project_back, surface
+from cogmap.services.sensory.motion import Motion
+from cogmap.services.sensory.motion_solver import (
+    DOWN,
+    FORWARD,
+    OFFSET,
+    PITCH,
+    RIGHT,
+    ROLL,
+    YAW,
+    Prior,
+    Projection,
+    Solution,
+    homography,
+    solve,
+)
+from cogmap.services.sensory.tracks import at_pixels, redrawn, seen_turn_rad, track_redrawn
 
-# Corners that are looked for; with fewer that are found the wheels alone measure the motion.
-CORNERS = 160
+# With fewer tracks, or a smaller share of them that agrees, views measure no motion. Of several
+# guesses the first that as many agree on as SURE_SHARE is taken.
 MIN_TRACKED = 12
-# Corners have a depth between these. Pixels of unknown depth are redrawn as if on the horizon.
-MIN_DEPTH_M = 2.0
-MAX_DEPTH_M = 40.0
-HORIZON_M = 1000.0
-# Of a tracked corner; one that misfits by OUTLIER_PX has a quarter of its weight, and where more
-# than half misfit by that much the motion is not believed.
-TRACK_SD_PX = 1.2
-OUTLIER_PX = 3.0
-MIN_INLIER_SHARE = 0.5
-# A bound on the steps; smaller ones than CONVERGED, in m and rad, end them; and the differences by
-# which derivatives are computed.
-ITERATIONS = 6
-CONVERGED = 1e-6
-DIFFERENCE = 1e-5
-# Between two views the robot hardly tilts or moves sideways.
-TILT_SD_RAD = 0.01
+MIN_INLIER_SHARE = 0.4
+SURE_SHARE = 0.7
+# The motion is solved for so often, while corners move by FAR_PX against the guess.
+ROUNDS = 3
+FAR_PX = 2.0
+# Smaller disparities are no better than none: they may be wrong by as much as they are.
+MIN_DISPARITY_PX = 1.5
+# How far a robot moves sideways and up: 1 cm on bumps, and a camera's mount or a slope leads it
+# that share of its way off. It tilts, as a random walk, by 1 degree in 0.1 s.
 SIDEWAYS_SD_M = 0.01
-# How far distances seen may all be wrong, as a share; in the town it was 0.001. Shorter ones than
-# MIN_SCALED_M do not correct it.
+SIDEWAYS_SHARE = 0.05
+TILT_WALK_RAD = 0.06
+# Tracks share errors, of matching, calibration and what moves by itself. By how much that raises
+# the variance of a motion (squared errors over it are then about 1, on KITTI's drive and in the
+# town), and that of the offset, which sees the same errors in every view.
+SHARED_ERRORS = 2.0
+LASTING_ERRORS = 10.0
+# How far all distances seen may be wrong, as a share: the camera's baseline and focal length.
 SCALE_SD = 0.005
-MIN_SCALED_M = 0.05
+# The offset of all disparities: its standard deviation before anything is known and at best, and by
+# how much it may vary where the calibration is believed. On KITTI's pairs it is 0.1 px, in the town
+# 0.01. One beyond MAX_OFFSET_PX is no error of the estimate: then the calibration is wrong.
+OFFSET_SD_PX = 0.3
+BEST_OFFSET_SD_PX = 0.03
+BELIEVED_SD_PX = 0.02
+MAX_OFFSET_PX = 0.5
+# A drift is measured from this distance on.
+MIN_DRIFT_M = 0.05
+MAX_DRIFT_RAD = 0.5
 
 
 @dataclass(frozen=True)
-class Motion:
-    """Distance ahead and turn between two views, with their standard deviations."""
+class Offset:
+    """The error of all disparities in pixels, and the standard deviation of this estimate."""
 
-    distance_m: float
-    turn_rad: float
-    distance_sd_m: float
-    turn_sd_rad: float
+    mean_px: float = 0.0
+    sd_px: float = OFFSET_SD_PX
+
+    @property
+    def correction_px(self) -> float:
+        """Return what must be added to disparities: 0 while the calibration may be right."""
+        is_sure = abs(self.mean_px) > MAX_OFFSET_PX and self.sd_px < MAX_OFFSET_PX / 2
+        return self.mean_px if is_sure else 0.0
+
+    def updated(self, solution: Solution) -> Offset:
+        """Return the offset with what a solution, of disparities that have been corrected by it,
+        says of it.
+        """
+        seen_px = solution.offset_px + self.correction_px
+        before = 1 / self.sd_px**2
+        worth = 1 / (LASTING_ERRORS * solution.offset_sd_px**2)
+        mean_px = (self.mean_px * before + seen_px * worth) / (before + worth)
+        return Offset(mean_px, max(BEST_OFFSET_SD_PX, 1 / math.sqrt(before + worth)))
 
 
-class Scale:
-    """The ratio of distances by the wheels to distances seen.
+class TrackedView(NamedTuple):
+    """A grey view (h, w), its disparities (h, w), 0 if they are unknown, and its corners (n, 2)."""
 
-    The wheels' noise is of mean one (paper §5.4), so their mean ratio estimates it better with
-    every metre, whatever constant share the views get wrong.
-    """
-
-    def __init__(self) -> None:
-        self._mean = 1.0
-        self._information = 1 / SCALE_SD**2
-
-    def correct(self, seen: Motion, wheels: Motion) -> Motion:
-        """Return what was seen, in the wheels' metres; while moving, both improve the scale."""
-        shortest_m = min(abs(seen.distance_m), abs(wheels.distance_m))
-        if shortest_m > MIN_SCALED_M and wheels.distance_sd_m > 0.0:
-            information = (seen.distance_m / wheels.distance_sd_m) ** 2
-            self._information += information
-            innovation = wheels.distance_m / seen.distance_m - self._mean
-            self._mean += innovation * information / self._information
-
-        scale_sd_m = seen.distance_m / math.sqrt(self._information)
-
-        return Motion(
-            distance_m=seen.distance_m * self._mean,
-            turn_rad=seen.turn_rad,
-            distance_sd_m=math.hypot(seen.distance_sd_m, scale_sd_m),
-            turn_sd_rad=seen.turn_sd_rad,
-        )
+    grey: Bytes
+    disparity_px: Singles
+    corners_px: Singles
+    calibration: Calibration
 
 
 class VisualOdometry:
     """Compares each view with the last one."""
 
     def __init__(self) -> None:
-        self._last: Bytes | None = None
-        self._scale = Scale()
+        self._last: TrackedView | None = None
+        self.offset = Offset()
 
     def update(
-        self, image: Bytes, depth_m: Singles, calibration: Calibration, wheels: Motion
-    ) -> Motion:
-        """Return the motion since the last view, by the wheels and the views; by the wheels alone
-        if the views do not suffice.
+        self,
+        view: TrackedView | None,
+        expected: Motion,
+        dt_s: float,
+        guesses: Sequence[Motion],
+    ) -> Motion | None:
+        """Return the motion in the `dt_s` since the last view, or None if the views do not suffice.
 
-        `image` is RGB (h, w, 3); `depth_m` (h, w) is its depth along the optical axis, 0 if it
-        is unknown.
+        `expected` is the prior; tracking begins from one of `guesses`, or from a turn on the spot
+        by which the views are most alike, whichever more tracks agree on.
         """
-        grey = np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY), np.uint8)
         last = self._last
-        self._last = grey
-        if last is None or last.shape != grey.shape:
-            return wheels
+        self._last = view
+        if last is None or view is None:
+            return None
+        if last.calibration != view.calibration:
+            self.offset = Offset()
+            return None
 
-        # Corners with a depth that is known well.
-        mask = ((depth_m > MIN_DEPTH_M) & (depth_m < MAX_DEPTH_M)).astype(np.uint8)
-        found = cv2.goodFeaturesToTrack(grey, CORNERS, 0.01, 7, mask=mask)
-        if found is None or len(found) < MIN_TRACKED:
-            return wheels
-
-        corners_px = np.asarray(found, np.float32).reshape(-1, 2)
-        pair = _Pair(last, grey, depth_m, calibration)
-        for turn_rad in (wheels.turn_rad, 0.0):
-            guess = np.array([wheels.distance_m, 0.0, turn_rad, 0.0, 0.0])
-            before_px, is_found = _track_back(pair, corners_px, guess)
-            if is_found.sum() < MIN_TRACKED:
+        at_corners_px = at_pixels(view.disparity_px, view.corners_px)
+        is_usable = at_corners_px > MIN_DISPARITY_PX
+        if is_usable.sum() < MIN_TRACKED:
+            return None
+        usable_px = at_corners_px[is_usable].astype(np.float64)
+        pair = _Pair(last.grey, view, view.corners_px[is_usable], usable_px)
+        prior = self._prior(expected, dt_s)
+        best: Solution | None = None
+        for guess in _starts(guesses, last, view):
+            solution = _solution(pair, prior, guess)
+            if solution is None:
                 continue
+            if best is None or solution.inlier_share > best.inlier_share:
+                best = solution
+            if best.inlier_share > SURE_SHARE:
+                break
 
-            points = points_at(corners_px[is_found], depth_m, calibration)
-            seen = _solve(points, before_px[is_found], guess, wheels, calibration)
-            if seen is not None:
-                return self._scale.correct(seen, wheels)
+        if best is None or best.inlier_share < MIN_INLIER_SHARE:
+            return None
+        self.offset = self.offset.updated(best)
+        return _motion(best)
 
-        return wheels
+    def _prior(self, expected: Motion, dt_s: float) -> Prior:
+        mean = np.zeros(7)
+        mean[FORWARD] = expected.distance_m
+        mean[YAW] = -expected.turn_rad
+
+        across_sd_m = math.hypot(SIDEWAYS_SD_M, SIDEWAYS_SHARE * expected.distance_sd_m)
+        across_sd_m = math.hypot(across_sd_m, SIDEWAYS_SHARE * expected.distance_m)
+        tilt_sd_rad = TILT_WALK_RAD * math.sqrt(dt_s)
+        sds = np.full(7, np.inf)
+        sds[DOWN] = across_sd_m
+        sds[FORWARD] = max(expected.distance_sd_m, 1e-4)
+        sds[YAW] = max(expected.turn_sd_rad, 1e-4)
+        sds[[PITCH, ROLL]] = tilt_sd_rad
+        sds[OFFSET] = BELIEVED_SD_PX
+        return Prior(mean, np.diag(1 / sds**2), across_sd_m)
+
+
+def _starts(guesses: Sequence[Motion], last: TrackedView, new: TrackedView) -> Iterator[Motion]:
+    """Yield the guesses, and then a turn on the spot."""
+    yield from guesses
+    turn_rad = seen_turn_rad(last.grey, new.grey, new.calibration.fx_px)
+    yield Motion(0.0, turn_rad, 0.0, 0.0)
 
 
 class _Pair(NamedTuple):
-    """Two grey views (h, w), the depth of the new one, and their calibration."""
+    """The last grey view (h, w) and the new view, with its usable corners (n, 2) and their
+    disparities (n,).
+    """
 
     last: Bytes
-    new: Bytes
-    depth_m: Singles
-    calibration: Calibration
+    new: TrackedView
+    pixels: Singles
+    disparity_px: Floats
 
 
-def _track_back(pair: _Pair, corners_px: Singles, guess: Floats) -> tuple[Floats, Booleans]:
-    """Find where the new view's corners were in the last one, (n, 2), and which were found (n,)."""
-    # The last view as it would look after the motion `guess`, and where each of its pixels was.
-    depth_m = np.where(pair.depth_m > 0, pair.depth_m, HORIZON_M).astype(np.float32)
-    points = surface(depth_m, pair.calibration)
-    before = np.dstack(project_back(points, guess, pair.calibration)).astype(np.float32)
-    redrawn = cv2.remap(
-        pair.last,
-        before[..., 0],
-        before[..., 1],
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )
+def _solution(pair: _Pair, prior: Prior, guess: Motion) -> Solution | None:
+    """Track from where `guess` puts the corners, and solve; None if too few are found.
 
-    anywhere = np.zeros_like(corners_px)
-    tracked_px, is_tracked, _ = cv2.calcOpticalFlowPyrLK(
-        pair.new,
-        redrawn,
-        corners_px,
-        anywhere,
-        winSize=(11, 11),
-        maxLevel=3,
-    )
-
-    at = tracked_px.reshape(1, -1, 2)
-    before_px = cv2.remap(
-        before,
-        at[..., 0],
-        at[..., 1],
-        cv2.INTER_LINEAR,
-        borderMode=cv2.BORDER_REPLICATE,
-    )[0]
-
-    height_px, width_px = pair.new.shape
-    last_px = (width_px - 1, height_px - 1)
-    is_inside = ((before_px >= 0) & (before_px <= last_px)).all(axis=1)
-    is_found = np.asarray(is_tracked[:, 0], bool) & is_inside
-    return np.asarray(before_px, np.float64), is_found
-
-
-def _solve(
-    points: Points,
-    before_px: Floats,
-    guess: Floats,
-    wheels: Motion,
-    calibration: Calibration,
-) -> Motion | None:
-    """Find the motion that best explains the points' earlier positions, by Gauss-Newton from
-    `guess`; None if too few agree on it.
+    A motion that is far from the guess is a guess for another time.
     """
-    # The wheels' motion is the prior, and that the robot hardly moves sideways or tilts.
-    expected = np.array([wheels.distance_m, 0.0, wheels.turn_rad, 0.0, 0.0])
-    sds = [wheels.distance_sd_m, SIDEWAYS_SD_M, wheels.turn_sd_rad, TILT_SD_RAD, TILT_SD_RAD]
-    prior = np.diag(1 / np.maximum(sds, 1e-6) ** 2)
+    motion = prior.mean.copy()
+    motion[FORWARD] = guess.distance_m
+    motion[YAW] = -guess.turn_rad
+    calibration = pair.new.calibration
+    pixels = pair.pixels.astype(np.float64)
+    projection = Projection(pixels, pair.disparity_px, calibration)
+    solution = None
+    for _ in range(ROUNDS):
+        before = homography(motion, calibration)
+        last, at_px = redrawn(pair.last, pair.new.disparity_px, before)
+        before_px, is_found = track_redrawn(pair.new.grey, last, at_px, pair.pixels)
+        if is_found.sum() < MIN_TRACKED:
+            return solution
 
-    motion = guess.copy()
-    information = prior
-    for _ in range(ITERATIONS):
-        # Residuals (n, 2) and their Jacobian (n, 2, 5), by differences.
-        differences = np.vstack([np.zeros(5), np.diag(np.full(5, DIFFERENCE))])
-        column_px, row_px = project_back(points, (motion + differences).T[..., None], calibration)
-        predicted_px, *shifted_px = np.stack([column_px, row_px], axis=2)
-        changes = (np.stack(shifted_px) - predicted_px) / DIFFERENCE
-        residual_px = before_px - predicted_px
-        jacobian = np.ascontiguousarray(np.moveaxis(changes, 0, 2))
-
-        # Geman-McClure's weights, over the variance of a track.
-        squared = (np.hypot(residual_px[:, 0], residual_px[:, 1]) / OUTLIER_PX) ** 2
-        weight: Floats = 1 / (1 + squared) ** 2 / TRACK_SD_PX**2
-
-        information = prior + np.einsum("nik,n,nil->kl", jacobian, weight, jacobian)
-        pull = np.einsum("nik,n,ni->k", jacobian, weight, residual_px)
-        step = np.linalg.solve(information, pull - prior @ (motion - expected))
-        motion = motion + step
-        if np.abs(step).max() < CONVERGED:
+        found = Projection(pixels[is_found], pair.disparity_px[is_found], calibration)
+        solution = solve(found, before_px[is_found].astype(np.float64), motion, prior)
+        change_px = projection.before(solution.motion)[0] - projection.before(motion)[0]
+        motion = solution.motion
+        if np.median(np.hypot(*change_px.T)) < FAR_PX:
             break
+    return solution
 
-    residual_px = before_px - np.column_stack(project_back(points, motion, calibration))
-    distance_px = np.hypot(*residual_px.T)
-    if (distance_px < OUTLIER_PX).mean() < MIN_INLIER_SHARE:
-        return None
 
-    inflation = max(1.0, float(np.median(distance_px)) / TRACK_SD_PX)
-    deviation = inflation * np.sqrt(np.diag(np.linalg.inv(information)))
+def _motion(solution: Solution) -> Motion:
+    """Return the motion in the plane, with its part of the errors that all tracks share."""
+    forward_m = float(solution.motion[FORWARD])
+    left_m = -float(solution.motion[RIGHT])
+    turn_rad = -float(solution.motion[YAW])
+    distance_m = math.copysign(math.hypot(forward_m, left_m), forward_m)
+
+    # Where it hardly moves, noise has a direction, too.
+    across_m = left_m - forward_m * turn_rad / 2
+    drift_rad = across_m * forward_m / (forward_m**2 + MIN_DRIFT_M**2)
+    variances = SHARED_ERRORS * np.diag(solution.covariance)
     return Motion(
-        distance_m=float(motion[0]),
-        turn_rad=float(motion[2]),
-        distance_sd_m=float(deviation[0]),
-        turn_sd_rad=float(deviation[2]),
+        distance_m=distance_m,
+        turn_rad=turn_rad,
+        distance_sd_m=math.hypot(math.sqrt(variances[FORWARD]), SCALE_SD * distance_m),
+        turn_sd_rad=math.sqrt(variances[YAW]),
+        drift_rad=float(np.clip(drift_rad, -MAX_DRIFT_RAD, MAX_DRIFT_RAD)),
     )

@@ -22,9 +22,9 @@ import numpy as np
 
 from cogmap.errors import CogmapError
 from cogmap.parallel import Progress, parallel_map
+from cogmap.robot import NEAREST_DEPTH_M
 from cogmap.schemas.sensing import Calibration
 from cogmap.services.sensory.disparity import DepthFromStereo
-from cogmap.services.sensory.module import Config
 from cogmap.services.sensory.rectify import rectification
 from cogmap.training.rendering.towns import Views, render_town
 
@@ -99,7 +99,7 @@ def with_stereo_depth(views: Views) -> Views:
     encoded = views["calibration"].tobytes()
     calibration = msgspec.json.decode(encoded, type=Calibration)
     rectified = rectification(calibration)
-    matcher = DepthFromStereo(rectified.calibration, Config().nearest_m)
+    matcher = DepthFromStereo(rectified.calibration, NEAREST_DEPTH_M)
 
     lefts = []
     depths_m = []

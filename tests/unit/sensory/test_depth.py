@@ -177,7 +177,7 @@ def test_the_scan_finds_an_obstacle_at_its_bearing_and_range_only() -> None:
     ahead_m = 8.0 + CALIBRATION.mount_forward_m
     left_m = (CALIBRATION.cx_px - 50) / FOCAL_PX * 8.0
 
-    bearing_rad, range_m = scan(depth_m, CALIBRATION, 32)
+    bearing_rad, range_m = scan(depth_m, CALIBRATION)
 
     hit = range_m > 0
     assert 1 <= hit.sum() <= 4
@@ -192,8 +192,17 @@ def test_the_scan_ignores_the_ground_and_what_hangs_above_the_robot() -> None:
     depth_m[rows] = ground_m[:, None]
     depth_m[:60] = 6.0
 
-    _, range_m = scan(depth_m, CALIBRATION, 32)
+    _, range_m = scan(depth_m, CALIBRATION)
     assert not range_m.any()
+
+
+@pytest.mark.parametrize(("focal_px", "sectors"), [(208.0, 32), (400.0, 19), (100.0, 50)])
+def test_sectors_are_of_one_angle_whatever_the_camera_sees(focal_px: float, sectors: int) -> None:
+    camera = msgspec.structs.replace(CALIBRATION, fx_px=focal_px)
+    bearing_rad, range_m = scan(np.zeros(SHAPE, np.float32), camera)
+
+    assert len(bearing_rad) == len(range_m) == sectors
+    assert np.diff(bearing_rad) == pytest.approx(np.radians(-75 / 32), rel=0.05)
 
 
 def test_a_wrong_match_or_two_are_no_obstacle() -> None:
@@ -201,5 +210,5 @@ def test_a_wrong_match_or_two_are_no_obstacle() -> None:
     depth_m[110:150, 90:110] = 20.0
     depth_m[120:122, 100] = 3.0
 
-    _, range_m = scan(depth_m, CALIBRATION, 32)
+    _, range_m = scan(depth_m, CALIBRATION)
     assert range_m[range_m > 0].min() > 15

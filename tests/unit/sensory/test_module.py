@@ -15,7 +15,9 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import Calibration, Odometry, RangeScan, SelfMotion, StereoFrame, View
 from cogmap.services.sensory.module import Config, build
+from cogmap.services.sensory.self_motion import Source
 from cogmap.testing import of_type
+from tests.support.world.stereo_street import CAMERA, frame, pair
 
 STEP_NS = 50_000_000
 CALIBRATION = Calibration(
@@ -172,22 +174,53 @@ def _resized(frame: StereoFrame, name: str, values: np.ndarray) -> StereoFrame:
     return msgspec.structs.replace(frame, **{name: Array.of(values)})
 
 
+def test_grey_images_give_the_same_as_colour_images_of_no_colour() -> None:
+    frame = _frame(0, 1)
+    left = frame.left.numpy()[..., 0]
+    right = frame.right.numpy()[..., 0]
+    grey = _resized(_resized(frame, "left", left), "right", right)
+    colour = _resized(
+        _resized(frame, "left", np.dstack([left] * 3)), "right", np.dstack([right] * 3)
+    )
+
+    assert _plain(_published([_odometry(1), grey])) == _plain(_published([_odometry(1), colour]))
+
+
+def test_large_images_are_worked_at_the_size_that_is_set() -> None:
+    config = Config(max_pixels=10_000, self_motion=Source.VIEWS)
+    large = msgspec.structs.replace(
+        CAMERA, width_px=400, height_px=150, fx_px=250.0, fy_px=250.0, cx_px=199.5, cy_px=74.5
+    )
+    module = build(config, "sensory")
+    (view,) = of_type(View, module.feed(frame(0, STEP_NS, pair((0.0, 0.0, 0.0), large), large)))
+    camera = view.calibration
+    depth_m = view.depth_m.numpy()
+    row = 55
+    ground_m = camera.mount_height_m * camera.fy_px / (row - camera.cy_px)
+
+    assert camera.width_px * camera.height_px <= 10_000
+    assert view.image.shape == (camera.height_px, camera.width_px, 3)
+    assert camera.fx_px / camera.width_px == pytest.approx(250 / 400)
+    assert (camera.cx_px + 0.5) / camera.width_px == pytest.approx(0.5)
+    assert np.median(depth_m[row, 60:100]) == pytest.approx(ground_m, rel=0.05)
+
+
 @pytest.mark.parametrize(
-    "frame",
+    "wrong",
     [
-        _resized(_frame(0, 1), "left", np.zeros((64, 96), np.uint8)),
+        _resized(_frame(0, 1), "left", np.zeros((64, 96, 2), np.uint8)),
         _resized(_frame(0, 1), "right", np.zeros((64, 95, 3), np.uint8)),
         _resized(_frame(0, 1), "left", np.zeros((64, 96, 3), np.float32)),
         _resized(_frame(0, 1), "right", np.zeros((0, 0, 3), np.uint8)),
         _frame(0, 10**9),
     ],
 )
-def test_a_frame_that_makes_no_sense_is_refused_and_changes_nothing(frame: StereoFrame) -> None:
+def test_a_frame_that_makes_no_sense_is_refused_and_changes_nothing(wrong: StereoFrame) -> None:
     module = build(Config(), "sensory")
     module.feed(_odometry(1))
 
     with pytest.raises(MessageError):
-        module.feed(frame)
+        module.feed(wrong)
     assert len(module.feed(_frame(0, 1))) == 3
 
 

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from cogmap.schemas.sensing import Calibration
-from cogmap.services.sensory.visual_odometry import Motion, VisualOdometry
-from cogmap.services.sensory.wheels import WheelNoise, fuse
+from cogmap.services.sensory.motion import Motion, Velocity
+from cogmap.services.sensory.tracks import corners
+from cogmap.services.sensory.visual_odometry import TrackedView, VisualOdometry
+from cogmap.services.sensory.wheels import WheelNoise, fuse, spread
 
 CAMERA = Calibration(
     width_px=320,
@@ -22,11 +24,10 @@ CAMERA = Calibration(
 )
 WALL_M = 12.0
 PX_PER_M = 50
-STILL = Motion(0.0, 0.0, 1e-3, 1e-3)
 
 
-def _view(distance_m: float, turn_rad: float) -> tuple[np.ndarray, np.ndarray]:
-    """A wall at WALL_M seen after a distance ahead and a turn to the left, and its depth."""
+def _view(distance_m: float, turn_rad: float) -> TrackedView:
+    """A wall at WALL_M seen after a distance ahead and a turn to the left."""
     column, row = np.meshgrid(np.arange(320.0), np.arange(240.0))
     right = (column - CAMERA.cx_px) / CAMERA.fx_px
     down = (row - CAMERA.cy_px) / CAMERA.fy_px
@@ -40,7 +41,8 @@ def _view(distance_m: float, turn_rad: float) -> tuple[np.ndarray, np.ndarray]:
     x_px = (1000 + PX_PER_M * across_m).astype(np.float32)
     y_px = (1000 + PX_PER_M * down_m).astype(np.float32)
     grey = cv2.remap(_texture(), x_px, y_px, cv2.INTER_LINEAR)
-    return cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB), depth_m.astype(np.float32)
+    disparity_px = (CAMERA.fx_px * CAMERA.baseline_m / depth_m).astype(np.float32)
+    return TrackedView(grey, disparity_px, corners(grey), CAMERA)
 
 
 def _texture() -> np.ndarray:
@@ -51,30 +53,47 @@ def _texture() -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("distance_m", "turn_rad"), [(0.6, 0.0), (0.5, 0.1), (0.0, -0.15), (0.8, 0.02)]
+    ("distance_m", "turn_rad"), [(0.6, 0.0), (0.5, 0.1), (0.0, -0.3), (2.0, 0.02)]
 )
-def test_views_measure_distance_and_turn_far_better_than_noisy_wheels(distance_m, turn_rad):
-    wheels = Motion(distance_m * 1.1, turn_rad + 0.03, 0.1 * distance_m + 1e-3, 0.03)
-    before = _view(0.0, 0.0)
-    after = _view(distance_m, turn_rad)
-
+def test_two_views_measure_distance_and_turn_with_nothing_else(
+    distance_m: float, turn_rad: float
+) -> None:
     odometry = VisualOdometry()
-    odometry.update(*before, CAMERA, STILL)
-    motion = odometry.update(*after, CAMERA, wheels)
+    nothing = Velocity().over(0.2)
+    still = Motion(0.0, 0.0, 0.0, 0.0)
+    odometry.update(_view(0.0, 0.0), nothing, 0.2, [still])
+    motion = odometry.update(_view(distance_m, turn_rad), nothing, 0.2, [still])
 
-    assert motion.turn_rad == pytest.approx(turn_rad, abs=0.004)
-    assert motion.distance_m == pytest.approx(distance_m, abs=0.04)
-    assert motion.turn_sd_rad < wheels.turn_sd_rad / 5
+    assert motion is not None
+    assert motion.turn_rad == pytest.approx(turn_rad, abs=0.003)
+    assert motion.distance_m == pytest.approx(distance_m, abs=0.03)
+    assert abs(motion.turn_rad - turn_rad) < 4 * motion.turn_sd_rad
+    assert abs(motion.distance_m - distance_m) < 4 * motion.distance_sd_m
 
 
-def test_without_texture_the_motion_is_that_of_the_wheels():
-    wheels = Motion(0.5, 0.1, 0.05, 0.02)
-    blank = np.full((240, 320, 3), 90, np.uint8)
-    depth_m = np.full((240, 320), 9.0, np.float32)
+def test_without_texture_views_measure_nothing() -> None:
+    blank = np.full((240, 320), 90, np.uint8)
+    disparity_px = np.full((240, 320), 9.0, np.float32)
+    view = TrackedView(blank, disparity_px, corners(blank), CAMERA)
     odometry = VisualOdometry()
-    odometry.update(blank, depth_m, CAMERA, wheels)
+    nothing = Velocity().over(0.2)
+    odometry.update(view, nothing, 0.2, [nothing])
 
-    assert odometry.update(blank, depth_m, CAMERA, wheels) == wheels
+    assert odometry.update(view, nothing, 0.2, [nothing]) is None
+
+
+def test_a_motion_of_views_alone_leads_where_they_saw_it_lead() -> None:
+    motion = Motion(1.0, 0.2, 0.01, 0.002, drift_rad=0.05)
+    x_m = y_m = heading_rad = 0.0
+    for speed_m_s, turn_rate_rad_s, dt_s, *_ in spread(motion, 0.1).tolist():
+        chord_rad = heading_rad + turn_rate_rad_s * dt_s / 2
+        x_m += speed_m_s * dt_s * np.cos(chord_rad)
+        y_m += speed_m_s * dt_s * np.sin(chord_rad)
+        heading_rad += turn_rate_rad_s * dt_s
+
+    assert heading_rad == pytest.approx(0.2)
+    assert np.hypot(x_m, y_m) == pytest.approx(1.0)
+    assert np.arctan2(y_m, x_m) == pytest.approx(0.15)
 
 
 def test_fused_rows_add_up_to_the_fused_motion_and_its_spread():
