@@ -30,6 +30,8 @@ from benchmarks.perception import photographs, stereo, towns
 from benchmarks.place_grid import measure as place_grid
 from benchmarks.planning import grid, tours
 from benchmarks.planning import measure as planning
+from benchmarks.real import measure as real
+from benchmarks.real import stereo as real_stereo
 from benchmarks.report import Metrics, Outcome, with_machine_unit
 from benchmarks.spiking import measure as spiking
 from cogmap.errors import CogmapError, UsageError
@@ -69,6 +71,13 @@ SUITE = (
         data={"camvid": "camvid"},
         arguments={"is_by_drive": True},
         has_command=False,
+    ),
+    Benchmark(
+        "real",
+        real_stereo.THRESHOLDS,
+        real.measure,
+        options=real.OPTIONS,
+        data={"stereo_folder": "kitti_stereo"},
     ),
     Benchmark("spiking", spiking.THRESHOLDS, spiking.measure, options=spiking.OPTIONS),
     Benchmark(

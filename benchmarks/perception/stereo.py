@@ -101,6 +101,13 @@ def plain_sgbm(left: Bytes, right: Bytes, most_px: float) -> Singles:
     """Match grey images by StereoSGBM as OpenCV's documentation sets it up. Returns disparities,
     float32 (h, w), 0 unmatched.
     """
+    left_grey = np.asarray(cv2.cvtColor(left, cv2.COLOR_RGB2GRAY), np.uint8)
+    right_grey = np.asarray(cv2.cvtColor(right, cv2.COLOR_RGB2GRAY), np.uint8)
+    return plain_disparity_px(left_grey, right_grey, most_px)
+
+
+def plain_disparity_px(left: Bytes, right: Bytes, most_px: float) -> Singles:
+    """Return what `plain_sgbm` does, of grey images (h, w)."""
     area = PLAIN_BLOCK_PX**2
     matcher = cv2.StereoSGBM.create(
         minDisparity=0,
@@ -113,9 +120,7 @@ def plain_sgbm(left: Bytes, right: Bytes, most_px: float) -> Singles:
         speckleWindowSize=100,
         speckleRange=32,
     )
-    left_grey = cv2.cvtColor(left, cv2.COLOR_RGB2GRAY)
-    right_grey = cv2.cvtColor(right, cv2.COLOR_RGB2GRAY)
-    steps = matcher.compute(left_grey, right_grey)
+    steps = matcher.compute(left, right)
 
     matched = np.maximum(steps, 0).astype(np.float32)
     return matched / np.float32(STEPS_PER_PIXEL)

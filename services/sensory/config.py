@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 
 from cogmap.schemas.base import Share
-from cogmap.services.sensory.self_motion import Source
+from cogmap.services.sensory.self_motion.sense import Source
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):

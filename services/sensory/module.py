@@ -23,14 +23,14 @@ from cogmap.services.sensory.image import (
     grey_image,
     working_calibration,
 )
-from cogmap.services.sensory.odometry_buffer import NS_PER_S, OdometryBuffer
 from cogmap.services.sensory.pair_check import PairCheck, PairFault, is_clipped
 from cogmap.services.sensory.rectify import rectification
 from cogmap.services.sensory.scan import scan
-from cogmap.services.sensory.self_motion import SelfMotionSense, Source
-from cogmap.services.sensory.tracks import corners
-from cogmap.services.sensory.visual_odometry import TrackedView
-from cogmap.services.sensory.wheels import WheelNoise
+from cogmap.services.sensory.self_motion.odometry_buffer import NS_PER_S, OdometryBuffer
+from cogmap.services.sensory.self_motion.sense import SelfMotionSense, Source
+from cogmap.services.sensory.self_motion.tracks import corners
+from cogmap.services.sensory.self_motion.visual_odometry import TrackedView
+from cogmap.services.sensory.self_motion.wheels import WheelNoise
 
 __all__ = ["Config", "SensoryMemory", "build"]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Bytes, Singles
 from cogmap.services.sensory.disparity import BLOCK_PX
-from cogmap.services.sensory.tracks import at_pixels, track
+from cogmap.services.sensory.self_motion.tracks import at_pixels, track
 
 # With fewer corners nothing can be said. In a pair that belongs together most of them match: where
 # fewer than MIN_MATCHED do, something else is tried. Exchanged, images match by so much more.

@@ -15,7 +15,7 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import Calibration, Odometry, RangeScan, SelfMotion, StereoFrame, View
 from cogmap.services.sensory.module import Config, build
-from cogmap.services.sensory.self_motion import Source
+from cogmap.services.sensory.self_motion.sense import Source
 from cogmap.testing import of_type
 from tests.support.world.stereo_street import CAMERA, frame, pair
 

@@ -11,7 +11,7 @@ import pytest
 
 from cogmap.schemas.sensing import SelfMotion, View
 from cogmap.services.sensory.module import Config, build
-from cogmap.services.sensory.self_motion import Source
+from cogmap.services.sensory.self_motion.sense import Source
 from cogmap.testing import of_type
 from tests.support.world.stereo_street import Image, frame, pair
 

@@ -10,7 +10,7 @@ import pytest
 
 from cogmap.schemas.sensing import Calibration, Odometry, SelfMotion
 from cogmap.services.sensory.module import Config, build
-from cogmap.services.sensory.self_motion import Source
+from cogmap.services.sensory.self_motion.sense import Source
 from cogmap.testing import of_type
 from tests.support.world.stereo_street import CAMERA, Image, Pose, frame, pair
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from cogmap.schemas.sensing import Calibration
-from cogmap.services.sensory.motion import Motion, Velocity
-from cogmap.services.sensory.tracks import corners
-from cogmap.services.sensory.visual_odometry import TrackedView, VisualOdometry
-from cogmap.services.sensory.wheels import WheelNoise, fuse, spread
+from cogmap.services.sensory.self_motion.motion import Motion, Velocity
+from cogmap.services.sensory.self_motion.tracks import corners
+from cogmap.services.sensory.self_motion.visual_odometry import TrackedView, VisualOdometry
+from cogmap.services.sensory.self_motion.wheels import WheelNoise, fuse, spread
 
 CAMERA = Calibration(
     width_px=320,

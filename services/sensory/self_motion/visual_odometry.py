@@ -18,8 +18,8 @@ import numpy as np
 
 from cogmap.geometry.arrays import Bytes, Floats, Singles
 from cogmap.schemas.sensing import Calibration
-from cogmap.services.sensory.motion import Motion
-from cogmap.services.sensory.motion_solver import (
+from cogmap.services.sensory.self_motion.motion import Motion
+from cogmap.services.sensory.self_motion.motion_solver import (
     DOWN,
     FORWARD,
     OFFSET,
@@ -33,7 +33,12 @@ from cogmap.services.sensory.motion_solver import (
     homography,
     solve,
 )
-from cogmap.services.sensory.tracks import at_pixels, redrawn, seen_turn_rad, track_redrawn
+from cogmap.services.sensory.self_motion.tracks import (
+    at_pixels,
+    redrawn,
+    seen_turn_rad,
+    track_redrawn,
+)
 
 # With fewer tracks, or a smaller share of them that agrees, views measure no motion. Of several
 # guesses the first that as many agree on as SURE_SHARE is taken.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import enum
 
 from cogmap.geometry.arrays import Floats
-from cogmap.services.sensory.motion import Motion, Velocity
-from cogmap.services.sensory.visual_odometry import TrackedView, VisualOdometry
-from cogmap.services.sensory.wheels import Scale, WheelDoubt, WheelNoise, fuse, spread
+from cogmap.services.sensory.self_motion.motion import Motion, Velocity
+from cogmap.services.sensory.self_motion.visual_odometry import TrackedView, VisualOdometry
+from cogmap.services.sensory.self_motion.wheels import Scale, WheelDoubt, WheelNoise, fuse, spread
 
 STILL = Motion(0.0, 0.0, 0.0, 0.0)
 

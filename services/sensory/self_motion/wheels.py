@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from cogmap.services.sensory.motion import Motion
-from cogmap.services.sensory.visual_odometry import SCALE_SD
+from cogmap.services.sensory.self_motion.motion import Motion
+from cogmap.services.sensory.self_motion.visual_odometry import SCALE_SD
 
 # Wheels that slipped are believed again after some seconds without it. A disagreement of more
 # standard deviations than SURPRISE_SDS is no noise.
