@@ -30,6 +30,14 @@ STEPS = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 20, 0.02)
 MAX_RETURN_PX = 0.5
 # The width at which whole views are compared.
 SMALL_PX = 160
+# Views whose brightness differs by more than this share in one of so many bands are evened before
+# corners are tracked between them: a camera's exposure changed, or it rolls while a lamp flickers.
+# Evened images have more noise, so others are not.
+SAME_EXPOSURE = 0.2
+BANDS = 8
+EVENED_PX = (31, 31)
+EVENED_CONTRAST = 100.0
+DARK_LEVEL = 8.0
 
 
 def corners(grey: Bytes) -> Singles:
@@ -55,6 +63,24 @@ def seen_turn_rad(last: Bytes, new: Bytes, focal_px: float) -> float:
     first, second = (image.astype(np.float32) for image in small)
     (right_px, _), _ = cv2.phaseCorrelate(first, second, window)
     return math.atan2(right_px / scale, focal_px)
+
+
+def is_exposed_alike(one: Bytes, other: Bytes) -> bool:
+    """Return whether two images (h, w) are of one brightness, from top to bottom."""
+    bands = [
+        cv2.resize(image, (1, BANDS), interpolation=cv2.INTER_AREA).astype(np.float64) + 1
+        for image in (one, other)
+    ]
+    return float(np.abs(np.log(bands[0] / bands[1])).max()) < SAME_EXPOSURE
+
+
+def evened(grey: Bytes) -> Bytes:
+    """Return an image (h, w) without what exposure changes: each pixel beside the mean around it,
+    as a ratio.
+    """
+    logarithm = np.log(grey.astype(np.float32) + DARK_LEVEL)
+    beside = logarithm - cv2.boxFilter(logarithm, -1, EVENED_PX)
+    return np.asarray(np.clip(128 + EVENED_CONTRAST * beside, 0, 255), np.uint8)
 
 
 def redrawn(last: Bytes, disparity_px: Singles, before: Floats) -> tuple[Bytes, Singles]:

@@ -35,6 +35,8 @@ from cogmap.services.sensory.self_motion.motion_solver import (
 )
 from cogmap.services.sensory.self_motion.tracks import (
     at_pixels,
+    evened,
+    is_exposed_alike,
     redrawn,
     seen_turn_rad,
     track_redrawn,
@@ -139,6 +141,9 @@ class VisualOdometry:
         if is_usable.sum() < MIN_TRACKED:
             return None
         usable_px = at_corners_px[is_usable].astype(np.float64)
+        if not is_exposed_alike(last.grey, view.grey):
+            last = last._replace(grey=evened(last.grey))
+            view = view._replace(grey=evened(view.grey))
         pair = _Pair(last.grey, view, view.corners_px[is_usable], usable_px)
         prior = self._prior(expected, dt_s)
         best: Solution | None = None

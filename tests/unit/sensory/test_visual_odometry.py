@@ -71,6 +71,22 @@ def test_two_views_measure_distance_and_turn_with_nothing_else(
     assert abs(motion.distance_m - distance_m) < 4 * motion.distance_sd_m
 
 
+@pytest.mark.parametrize("period_rows", [1e9, 40.0])
+def test_another_exposure_or_one_that_rolls_changes_no_motion(period_rows: float) -> None:
+    rows = np.arange(240)[:, None]
+    brightness = 1 + 0.3 * np.cos(rows / period_rows)
+    after = _view(0.6, 0.05)
+    brighter = np.clip(after.grey * brightness * 0.8, 0, 255).astype(np.uint8)
+    odometry = VisualOdometry()
+    nothing = Velocity().over(0.2)
+    odometry.update(_view(0.0, 0.0), nothing, 0.2, [nothing])
+    motion = odometry.update(after._replace(grey=brighter), nothing, 0.2, [nothing])
+
+    assert motion is not None
+    assert motion.turn_rad == pytest.approx(0.05, abs=0.004)
+    assert motion.distance_m == pytest.approx(0.6, abs=0.04)
+
+
 def test_without_texture_views_measure_nothing() -> None:
     blank = np.full((240, 320), 90, np.uint8)
     disparity_px = np.full((240, 320), 9.0, np.float32)
