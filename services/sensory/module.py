@@ -113,7 +113,7 @@ class SensoryMemory:
         yield view
 
         depth_m = view.depth_m.numpy().astype(np.float32, copy=False)
-        bearing_rad, range_m = scan(depth_m, view.calibration)
+        bearing_rad, range_m = scan(depth_m, view.calibration, self._self_motion.slope)
         ranges = RangeScan(
             stamp_ns=view.stamp_ns,
             frame=view.frame,

@@ -22,16 +22,17 @@ MIN_SECTORS = 8
 MAX_SECTORS = 128
 
 
-def scan(depth_m: Singles, calibration: Calibration) -> tuple[Singles, Singles]:
+def scan(depth_m: Singles, calibration: Calibration, slope: float = 0.0) -> tuple[Singles, Singles]:
     """Return bearing (left positive) and range of the nearest obstacle in each sector, float32
     (sectors,), as many as the camera's field of view has; range 0 is none.
 
+    `slope` is by how much the ground falls away as the camera sees it, as a share of the distance.
     Of each image column its third-nearest pixel counts that shows an obstacle. Bearing and range
     are from the robot's origin.
     """
     rows = np.arange(calibration.height_px)
-    slope = (rows - calibration.cy_px) / calibration.fy_px
-    below_camera_m = slope.astype(np.float32)[:, None] * depth_m
+    down = (rows - calibration.cy_px) / calibration.fy_px - slope
+    below_camera_m = down.astype(np.float32)[:, None] * depth_m
     camera_m = calibration.mount_height_m
     is_over_ground = below_camera_m < camera_m - MIN_HEIGHT_M
     is_under_top = below_camera_m > camera_m - MAX_HEIGHT_M

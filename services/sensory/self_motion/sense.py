@@ -30,7 +30,7 @@ class SelfMotionSense:
     def __init__(self, source: Source, noise: WheelNoise) -> None:
         self._source = source
         self._noise = noise
-        self._visual_odometry = VisualOdometry()
+        self._visual_odometry = VisualOdometry(has_wheels=source is Source.BOTH)
         self._velocity = Velocity()
         self._doubt = WheelDoubt()
         self._scale = Scale()
@@ -41,6 +41,13 @@ class SelfMotionSense:
         may be right.
         """
         return self._visual_odometry.offset.correction_px
+
+    @property
+    def slope(self) -> float:
+        """Return by how much the robot's way leads down as the camera sees it, as a share of the
+        way: how the camera is tilted against the ground. 0 until it has driven.
+        """
+        return self._visual_odometry.slope.mean
 
     def update(self, view: TrackedView | None, dt_s: float, rows: Floats) -> Floats:
         """Return the motion since the last view, `dt_s` before this one, or 0 if there is none:

@@ -52,10 +52,11 @@ ROUNDS = 3
 FAR_PX = 2.0
 # Smaller disparities are no better than none: they may be wrong by as much as they are.
 MIN_DISPARITY_PX = 1.5
-# How far a robot moves sideways and up: 1 cm on bumps, and a camera's mount or a slope leads it
-# that share of its way off. It tilts, as a random walk, by 1 degree in 0.1 s.
-SIDEWAYS_SD_M = 0.01
-SIDEWAYS_SHARE = 0.05
+# How far a robot moves sideways and up: 1 cm on bumps, and up a slope, or as its camera is mounted,
+# by that share of its way. Wheels do not lead it sideways. It tilts, as a random walk, by 1 degree
+# in 0.1 s.
+BUMPS_SD_M = 0.01
+ASIDE_SHARE = 0.05
 TILT_WALK_RAD = 0.06
 # Tracks share errors, of matching, calibration and what moves by itself. By how much that raises
 # the variance of a motion (squared errors over it are then about 1, on KITTI's drive and in the
@@ -71,6 +72,11 @@ OFFSET_SD_PX = 0.3
 BEST_OFFSET_SD_PX = 0.03
 BELIEVED_SD_PX = 0.02
 MAX_OFFSET_PX = 0.5
+# Of the camera's tilt against the ground: as it may be mounted (2 degrees), and at best, as a tilt
+# of a body changes with its load. How far a bump moves the camera up or down between two views.
+MOUNT_SLOPE_SD = 0.035
+BEST_SLOPE_SD = 0.002
+BUMP_SD_M = 0.02
 # A drift is measured from this distance on.
 MIN_DRIFT_M = 0.05
 MAX_DRIFT_RAD = 0.5
@@ -100,6 +106,24 @@ class Offset:
         return Offset(mean_px, max(BEST_OFFSET_SD_PX, 1 / math.sqrt(before + worth)))
 
 
+@dataclass(frozen=True)
+class Slope:
+    """By how much the camera sees its way lead down, as a share of the way, and how precisely: the
+    robot drives along the ground, so that is how the camera is tilted against it.
+    """
+
+    mean: float = 0.0
+    precision: float = 1 / MOUNT_SLOPE_SD**2
+
+    def updated(self, solution: Solution) -> Slope:
+        """Return the slope with one motion more."""
+        forward_m = float(solution.motion[FORWARD])
+        down_m = float(solution.motion[DOWN])
+        precision = self.precision + (forward_m / BUMP_SD_M) ** 2
+        mean = (self.mean * self.precision + down_m * forward_m / BUMP_SD_M**2) / precision
+        return Slope(mean, min(precision, 1 / BEST_SLOPE_SD**2))
+
+
 class TrackedView(NamedTuple):
     """A grey view (h, w), its disparities (h, w), 0 if they are unknown, and its corners (n, 2)."""
 
@@ -110,11 +134,13 @@ class TrackedView(NamedTuple):
 
 
 class VisualOdometry:
-    """Compares each view with the last one."""
+    """Compares each view with the last one, of a robot on wheels or of whatever moves a camera."""
 
-    def __init__(self) -> None:
+    def __init__(self, has_wheels: bool) -> None:
+        self._has_wheels = has_wheels
         self._last: TrackedView | None = None
         self.offset = Offset()
+        self.slope = Slope()
 
     def update(
         self,
@@ -134,6 +160,7 @@ class VisualOdometry:
             return None
         if last.calibration != view.calibration:
             self.offset = Offset()
+            self.slope = Slope()
             return None
 
         at_corners_px = at_pixels(view.disparity_px, view.corners_px)
@@ -159,6 +186,7 @@ class VisualOdometry:
         if best is None or best.inlier_share < MIN_INLIER_SHARE:
             return None
         self.offset = self.offset.updated(best)
+        self.slope = self.slope.updated(best)
         return _motion(best)
 
     def _prior(self, expected: Motion, dt_s: float) -> Prior:
@@ -166,16 +194,17 @@ class VisualOdometry:
         mean[FORWARD] = expected.distance_m
         mean[YAW] = -expected.turn_rad
 
-        across_sd_m = math.hypot(SIDEWAYS_SD_M, SIDEWAYS_SHARE * expected.distance_sd_m)
-        across_sd_m = math.hypot(across_sd_m, SIDEWAYS_SHARE * expected.distance_m)
+        aside_m = ASIDE_SHARE * math.hypot(expected.distance_m, expected.distance_sd_m)
+        aside_sd_m = math.hypot(BUMPS_SD_M, aside_m)
         tilt_sd_rad = TILT_WALK_RAD * math.sqrt(dt_s)
         sds = np.full(7, np.inf)
-        sds[DOWN] = across_sd_m
+        sds[DOWN] = aside_sd_m
         sds[FORWARD] = max(expected.distance_sd_m, 1e-4)
         sds[YAW] = max(expected.turn_sd_rad, 1e-4)
         sds[[PITCH, ROLL]] = tilt_sd_rad
         sds[OFFSET] = BELIEVED_SD_PX
-        return Prior(mean, np.diag(1 / sds**2), across_sd_m)
+        sideways_sd_m = BUMPS_SD_M if self._has_wheels else aside_sd_m
+        return Prior(mean, np.diag(1 / sds**2), sideways_sd_m)
 
 
 def _starts(guesses: Sequence[Motion], last: TrackedView, new: TrackedView) -> Iterator[Motion]:

@@ -205,6 +205,19 @@ def test_sectors_are_of_one_angle_whatever_the_camera_sees(focal_px: float, sect
     assert np.diff(bearing_rad) == pytest.approx(np.radians(-75 / 32), rel=0.05)
 
 
+def test_the_ground_is_no_obstacle_to_a_camera_that_is_tilted_as_its_way_shows() -> None:
+    slope = -0.03
+    rows = np.arange(120, HEIGHT)
+    down = (rows - CALIBRATION.cy_px) / FOCAL_PX
+    depth_m = np.zeros(SHAPE, np.float32)
+    depth_m[rows] = (CALIBRATION.mount_height_m / (down - slope))[:, None]
+
+    _, level_m = scan(depth_m, CALIBRATION)
+    _, tilted_m = scan(depth_m, CALIBRATION, slope)
+    assert level_m.any()
+    assert not tilted_m.any()
+
+
 def test_a_wrong_match_or_two_are_no_obstacle() -> None:
     depth_m = np.zeros(SHAPE, np.float32)
     depth_m[110:150, 90:110] = 20.0

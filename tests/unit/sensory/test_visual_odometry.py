@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 
 from cogmap.schemas.sensing import Calibration
+from cogmap.services.sensory.disparity import DepthFromStereo
 from cogmap.services.sensory.self_motion.motion import Motion, Velocity
 from cogmap.services.sensory.self_motion.tracks import corners
 from cogmap.services.sensory.self_motion.visual_odometry import TrackedView, VisualOdometry
 from cogmap.services.sensory.self_motion.wheels import WheelNoise, fuse, spread
+from tests.support.world.stereo_street import CAMERA as STREET_CAMERA
+from tests.support.world.stereo_street import pair
 
 CAMERA = Calibration(
     width_px=320,
@@ -58,7 +62,7 @@ def _texture() -> np.ndarray:
 def test_two_views_measure_distance_and_turn_with_nothing_else(
     distance_m: float, turn_rad: float
 ) -> None:
-    odometry = VisualOdometry()
+    odometry = VisualOdometry(has_wheels=False)
     nothing = Velocity().over(0.2)
     still = Motion(0.0, 0.0, 0.0, 0.0)
     odometry.update(_view(0.0, 0.0), nothing, 0.2, [still])
@@ -77,7 +81,7 @@ def test_another_exposure_or_one_that_rolls_changes_no_motion(period_rows: float
     brightness = 1 + 0.3 * np.cos(rows / period_rows)
     after = _view(0.6, 0.05)
     brighter = np.clip(after.grey * brightness * 0.8, 0, 255).astype(np.uint8)
-    odometry = VisualOdometry()
+    odometry = VisualOdometry(has_wheels=False)
     nothing = Velocity().over(0.2)
     odometry.update(_view(0.0, 0.0), nothing, 0.2, [nothing])
     motion = odometry.update(after._replace(grey=brighter), nothing, 0.2, [nothing])
@@ -87,11 +91,26 @@ def test_another_exposure_or_one_that_rolls_changes_no_motion(period_rows: float
     assert motion.distance_m == pytest.approx(0.6, abs=0.04)
 
 
+def test_the_way_shows_how_the_camera_is_tilted() -> None:
+    odometry = VisualOdometry(has_wheels=False)
+    step = Velocity(6.0, 0.0, 1.0, 0.1).over(0.1)
+    tilted = msgspec.structs.replace(STREET_CAMERA, cy_px=STREET_CAMERA.cy_px + 6.0)
+    depth = DepthFromStereo(tilted)
+    for number in range(6):
+        left, right = pair((0.6 * number, 0.0, 0.0), STREET_CAMERA)
+        colours = [cv2.cvtColor(grey, cv2.COLOR_GRAY2RGB) for grey in (left, right)]
+        view = TrackedView(left, depth.disparity_px(*colours), corners(left), tilted)
+        odometry.update(view, step, 0.1, [step])
+
+    # The image's middle row is taken for 6 px lower than it is.
+    assert odometry.slope.mean == pytest.approx(-6.0 / 200.0, abs=0.008)
+
+
 def test_without_texture_views_measure_nothing() -> None:
     blank = np.full((240, 320), 90, np.uint8)
     disparity_px = np.full((240, 320), 9.0, np.float32)
     view = TrackedView(blank, disparity_px, corners(blank), CAMERA)
-    odometry = VisualOdometry()
+    odometry = VisualOdometry(has_wheels=False)
     nothing = Velocity().over(0.2)
     odometry.update(view, nothing, 0.2, [nothing])
 
