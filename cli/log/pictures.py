@@ -118,7 +118,8 @@ def image(
     message = views.message(reader, chosen.record)
     recognised = views.percepts(reader, chosen) if percepts else None
     if isinstance(message, StereoFrame):
-        pixels = views.image(message.left if camera == "left" else message.right, name)
+        chosen_image = message.left if camera == "left" else message.right
+        pixels = views.camera_image(chosen_image, name)
     else:
         assert isinstance(message, View)
         pixels = views.image(message.image, name)

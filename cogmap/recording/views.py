@@ -126,18 +126,22 @@ def percepts(reader: LogReader, frame: CameraFrame) -> Percepts | None:
 
 
 def image(array: Array, name: str) -> Image:
-    """Return RGB, (h, w, 3), of a grey or RGB image. Raises LogError, naming it by `name`, if it is
-    something else.
-    """
+    """Return RGB, (h, w, 3). Raises LogError, naming it by `name`, if it is something else."""
     shape = array.shape
-    if array.dtype == "|u1" and len(shape) == 2 and 0 not in shape:
-        return np.repeat(array.numpy()[..., None], 3, axis=2).astype(np.uint8, copy=False)
     is_rgb = array.dtype == "|u1" and len(shape) == 3 and shape[2] == 3
     if not is_rgb or 0 in shape:
         raise LogError(
             f"{name}: expected a uint8 image (height, width, 3), got {array.dtype} {shape}"
         )
     return array.numpy().astype(np.uint8, copy=False)
+
+
+def camera_image(array: Array, name: str) -> Image:
+    """Return a camera's image, grey or RGB, as RGB, (h, w, 3). Raises LogError as `image` does."""
+    shape = array.shape
+    if array.dtype == "|u1" and len(shape) == 2 and 0 not in shape:
+        return np.repeat(array.numpy()[..., None], 3, axis=2).astype(np.uint8, copy=False)
+    return image(array, name)
 
 
 def depth(array: Array, name: str) -> Depth:

@@ -91,3 +91,12 @@ def test_a_module_that_has_started_stays_ready_when_another_leaves(network: Netw
 
     assert health.ready
     shell.close()
+
+
+def test_health_has_the_notes_of_the_module(network: Network) -> None:
+    module = Module("action", "action-1", notes=lambda: ["3 odometries stood still"])
+    module.on(topics.ODOMETRY, command, emits=[topics.MOTOR_COMMAND])
+    shell, peer = observed(network, module)
+
+    assert next_health(peer, shell).notes == ["3 odometries stood still"]
+    shell.close()

@@ -132,6 +132,17 @@ def test_an_image_has_the_pixels_of_the_view_one_for_one(drive: Path) -> None:
     assert np.array_equal(read("drive-frame-4-view.png"), shade(4))
 
 
+def test_a_grey_camera_is_shown_in_grey(tmp_path: Path) -> None:
+    grey = np.ascontiguousarray(SCENE[..., 0])
+    pair = StereoFrame(
+        frame=4, stamp_ns=4, left=Array.of(grey), right=Array.of(grey), calibration=CAMERA
+    )
+    log = write(tmp_path / "grey.mcap", [pair])
+    log_command("image", log, "--camera", "left", "-o", "left.png")
+
+    assert np.array_equal(read("left.png"), np.dstack([grey] * 3))
+
+
 def levels(colour: str) -> npt.NDArray[np.float64]:
     """Red, green and blue of a colour, from 0 to 255."""
     return np.array(to_rgb(colour)) * 255
