@@ -123,6 +123,17 @@ def test_views_alone_measure_a_drive_with_any_camera_at_any_rate(
     assert heading_rad == pytest.approx(true_heading_rad, abs=0.012)
 
 
+def test_a_camera_far_before_the_axle_swings_out_in_a_bend_and_that_is_measured() -> None:
+    axle = _bend(18, 0.8, 0.03)
+    poses = [(x + 1.1 * math.cos(turn), y + 1.1 * math.sin(turn), turn) for x, y, turn in axle]
+    x_m, y_m, _ = _end(_drive(poses, Source.VIEWS))
+    cross_m = poses[-1][1] - poses[0][1]
+
+    # As arcs alone the motions would end 1.1 m times the turn, 0.59 m, beside it.
+    assert x_m == pytest.approx(poses[-1][0] - poses[0][0], abs=0.15)
+    assert y_m == pytest.approx(cross_m, abs=0.2)
+
+
 def test_views_say_how_wrong_they_are() -> None:
     distance_m, sd_m = _distances_m(_drive(_bend(14, 0.6), Source.VIEWS)).T
     chi2 = float(np.mean(((distance_m - 0.6) / sd_m) ** 2))
