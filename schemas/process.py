@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
-from cogmap.schemas.base import Count, Finite, Message, Name
+from cogmap.schemas.base import Count, Finite, Message, Name, Unit
 
 
 class Clock(Message, kw_only=True, frozen=True):
     """The time that stamps messages. `rate` is its speed relative to wall time, 0 in lockstep."""
 
     rate: Finite = 1.0
+
+
+class Playback(Message, kw_only=True, frozen=True):
+    """How much of a recording has been played until the stamp; `progress` is 1 once it is over.
+    Observers only.
+
+    `views` were published, and `skipped` could not be read: `reasons` has a sentence for each of
+    these since the message before.
+    """
+
+    recording: Name
+    views: Count
+    skipped: Count
+    progress: Unit
+    reasons: list[str] = []
 
 
 class Presence(Message, kw_only=True, frozen=True):

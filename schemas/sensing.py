@@ -219,8 +219,8 @@ class SpeedLimit(enum.StrEnum):
     """What keeps the robot below its cruising speed; NONE if nothing does.
 
     POSE_AGE: the pose that the command is computed from is old, as the machine is too slow. STUCK:
-    the robot was commanded to move and did not. AT_GOAL: every goal is reached. OTHER is for
-    modules of other people.
+    the robot was commanded to move and did not. AT_GOAL: every goal is reached. RECORDING: what is
+    sensed was recorded, and no command moves anything in it. OTHER is for modules of other people.
     """
 
     NONE = ""
@@ -233,6 +233,7 @@ class SpeedLimit(enum.StrEnum):
     NO_POSE = "no pose"
     NO_ROUTE = "no route"
     AT_GOAL = "at goal"
+    RECORDING = "recording"
     OTHER = "other"
 
 

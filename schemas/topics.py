@@ -25,8 +25,8 @@ class Delivery(enum.Enum):
 class Scope(enum.Enum):
     """MODEL: what the agent senses, thinks and does, the same bytes for the same seed in lockstep.
 
-    PROCESS: how the processes fare, which differs from run to run. TRUTH: the simulator's; no
-    module may subscribe.
+    PROCESS: how the processes fare, which differs from run to run. TRUTH: the simulator's or the
+    recording's; no module may subscribe.
     """
 
     MODEL = "model"
@@ -104,6 +104,7 @@ TRUE_TOWN = Topic(
     max_bytes=16 * MIB,
     sensed=True,
 )
+PLAYBACK = Topic("truth/playback", process.Playback, 0, _NEVER, Scope.TRUTH, sensed=True)
 PRESENCE = Topic("presence", process.Presence, 0, _NEVER, Scope.PROCESS)
 HEALTH = Topic("health", process.Health, 0, _LATEST, Scope.PROCESS)
 

@@ -39,6 +39,7 @@ class Entry(NamedTuple):
 
 MODULES = (
     "sim",
+    "player",
     "sensory",
     "epam",
     "workspace",
@@ -49,6 +50,14 @@ MODULES = (
     "action",
     "motor",
 )
+
+SIM = "sim"
+PLAYER = "player"
+
+BODIES = (SIM, PLAYER)
+"""The modules that stand for the robot in its world, of which one takes part in a run: simulated,
+or recorded.
+"""
 
 ENTRIES = {
     name: Entry(f"cogmap.services.{name}.config:Config", f"cogmap.services.{name}.module:build")
@@ -61,6 +70,11 @@ _OF_CODELETS = (
     "scipy.spatial",
     "scipy.optimize",
 )
+
+
+def taking_part(body: str = SIM) -> tuple[str, ...]:
+    """Return the modules of a run with that one of BODIES."""
+    return tuple(name for name in MODULES if name == body or name not in BODIES)
 
 
 def codelets() -> tuple[Codelet, ...]:
@@ -120,7 +134,7 @@ def prepare(name: str) -> Iterator[None]:
     """Import what module `name` consists of, and begin what it waits for when it is built: in
     steps, so that something else can be done between them. Raises what an import raises.
     """
-    if name == "sim":
+    if name == SIM:
         from cogmap.services.sim.rendering import egl_trial
 
         egl_trial.trial()

@@ -58,7 +58,7 @@ def mean_errors_m(town: int, laps: float) -> tuple[float, float, float]:
     for topic in OBSERVED:
         watching.on(topic, observer.update)
 
-    with running([*build(registry.MODULES, sections), watching]) as runner:
+    with running([*build(registry.taking_part(), sections), watching]) as runner:
         runner.run(lambda: observer.has_ended)
 
     if observer.goals_reached < observer.goals:

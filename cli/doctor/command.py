@@ -42,7 +42,10 @@ def doctor(as_json: bool, connect: str, agent: str) -> None:
     try:
         with observing(connect, agent, "doctor") as bus:
             observed = observe(bus, OBSERVE_S)
-            findings += system.examine(registry.MODULES, observed, discover(bus.session, agent))
+            present = {member.module for member in observed.ready}
+            is_recorded = registry.PLAYER in present and registry.SIM not in present
+            expected = registry.taking_part(registry.PLAYER if is_recorded else registry.SIM)
+            findings += system.examine(expected, observed, discover(bus.session, agent))
     except NoRouterError:
         remedy = "start one with `cogmap run`, or name it with --connect"
         findings.append(Finding("router", f"none answers at {connect}", remedy))

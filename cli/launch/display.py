@@ -30,12 +30,17 @@ class Display(Protocol):
 
 
 def _drive_line(observer: Observer, errors: Errors) -> str:
-    """Write time and distance so far, and the errors at the last estimate; 0 before the first."""
+    """Write time and distance so far, and the errors at the last estimate; 0 before the first, none
+    if nobody knows the true path.
+    """
+    driven = f"{observer.elapsed_s:5.1f} s  {observer.travelled_m:6.1f} m"
+    if observer.start is None:
+        return driven
+
     estimate_m, fused_m, wheels_m = (
         float(errors_m[-1]) if errors_m.size else 0.0
         for errors_m in (errors.estimate_m, errors.fused_m, errors.wheels_m)
     )
-    driven = f"{observer.elapsed_s:5.1f} s  {observer.travelled_m:6.1f} m"
     alone = f"path integration alone: fused {fused_m:.2f} m"
     if errors.wheels_m.size:
         alone = f"{alone}, wheels {wheels_m:.2f} m"

@@ -32,6 +32,7 @@ from cogmap.errors import ProcessFailedError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
 from cogmap.schemas.sensing import SpeedLimit
+from cogmap.services import registry
 
 PUMP_S = 0.05
 SHOW_PERIOD_S = 0.25
@@ -111,7 +112,7 @@ class Drive:
                 self.supervisor.release()
                 ending = self._follow(watch, stop, display)
         except ProcessFailedError as error:
-            if observer.start is None:
+            if not observer.has_begun:
                 raise
             return Ending(Outcome.MODULE_FAILED, str(error))
 
@@ -150,7 +151,7 @@ class Drive:
             missing = watch.missing(self.participants)
             if not missing:
                 self._note("all ready")
-            if observer.start is not None:
+            if observer.has_begun:
                 self._note(FIRST_POSE)
             if tally.cycle_ms:
                 self._note("first command")
@@ -158,7 +159,7 @@ class Drive:
             if time.monotonic() < show_s:
                 continue
             show_s = time.monotonic() + SHOW_PERIOD_S
-            if observer.start is None:
+            if not observer.has_begun:
                 display.waiting(missing)
             else:
                 display.driving(observer, observer.errors())
@@ -184,7 +185,7 @@ class Drive:
             return self._ending_of_simulation(observer)
         if self.is_over_limit():
             return _out_of_time(tally, missing)
-        if observer.start is None:
+        if not observer.has_begun:
             return None
 
         command = tally.command
@@ -197,11 +198,17 @@ class Drive:
             missing=missing,
             is_charging=tally.energy.is_charging,
             is_out=tally.energy.is_out,
+            is_recorded=bool(self.choices.recording),
         )
         return self._watchdog.check(situation)
 
     def _ending_of_simulation(self, observer: Observer) -> Ending:
-        """Say how a drive ended whose simulation has: at its goals, or as its time is over."""
+        """Say how a drive ended whose simulation has: at its goals, or as its time is over; or its
+        recording.
+        """
+        if self.choices.recording:
+            return Ending(Outcome.RECORDING_OVER, _played(observer))
+
         sim = self.sections["sim"]
         if not sim["ends_at_goal"] and self.guide is None:
             return Ending(Outcome.ROUTE_COMPLETE, "the time of the drive is over")
@@ -224,7 +231,7 @@ class Drive:
     def _close(self, watch: Watch | None) -> None:
         """End first what moves, then what thinks, then what records, the router last."""
         supervisor = self.supervisor
-        supervisor.end(["sim"], GRACE_S)
+        supervisor.end(registry.BODIES, GRACE_S)
         supervisor.end(set(supervisor.children) - {RECORDER, ROUTER}, GRACE_S)
         if watch is not None:
             watch.pump(0.0)
@@ -233,6 +240,15 @@ class Drive:
         supervisor.end([ROUTER], GRACE_S)
         if not self.choices.without:  # modules of others may still write there
             shutil.rmtree(self.folder / STATE_NAME, ignore_errors=True)
+
+
+def _played(observer: Observer) -> str:
+    """Say that all of a recording was played, and how many views of it could not be."""
+    played = observer.played
+    views = f"all of {played.recording} was played, {played.views} views"
+    if not played.skipped:
+        return views
+    return f"{views}; {played.skipped} were left out, the last one as {played.reasons[-1]}"
 
 
 def _out_of_time(tally: Tally, missing: list[str]) -> Ending:

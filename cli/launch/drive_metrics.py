@@ -89,7 +89,9 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     `forgotten` are the objects that left the map, having been seen too seldom. `gaps`: messages
     lost for good, by NEVER_DROP topic. `energy` is None where the robot's battery does not run
     down. `recalled` is the map of an earlier run that the agent has recalled, empty where it has
-    none, and `recalled_m` the distance that it had driven by then.
+    none, and `recalled_m` the distance that it had driven by then. `recording` is what was played,
+    empty where the drive was simulated: `views` of it, and `skipped`, which could not be read, the
+    last few of them for `skipped_reasons`.
     """
 
     drive_s: float
@@ -129,6 +131,10 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     energy: EnergyMetrics | None = None
     recalled: str = ""
     recalled_m: float | None = None
+    recording: str = ""
+    views: int = 0
+    skipped: int = 0
+    skipped_reasons: list[str] = []
 
 
 class RecordedMetrics(DriveMetrics, kw_only=True):
@@ -251,4 +257,8 @@ def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) 
         energy=tally.energy.metrics(),
         recalled=tally.observer.recalled,
         recalled_m=tally.observer.recalled_m,
+        recording=observer.played.recording,
+        views=observer.played.views,
+        skipped=observer.played.skipped,
+        skipped_reasons=list(observer.played.reasons),
     )

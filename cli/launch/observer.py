@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,16 +18,19 @@ from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta
 from cogmap.schemas.nodes import Self
+from cogmap.schemas.process import Playback
 from cogmap.schemas.sensing import Odometry, Pose, SelfMotion, TruePose, TrueTown
 
 OBSERVED = (
     topics.TRUE_TOWN,
     topics.TRUE_POSE,
+    topics.PLAYBACK,
     topics.ODOMETRY,
     topics.SELF_MOTION,
     topics.DELTA,
 )
 MOTION_COLUMNS = 5
+MAX_REASONS = 8
 STREET_M = 8.0
 """Farther from all of its path so far, the robot is in a street new to it."""
 
@@ -62,6 +66,25 @@ def _ratio(errors_m: Floats, baseline_m: Floats) -> float:
     return float(errors_m.mean() / baseline_m.mean())
 
 
+class Played:
+    """How much of a recording has been played: `recording` names it, and is empty where the drive
+    is simulated. `reasons` say why the last of `skipped` views were left out.
+    """
+
+    def __init__(self) -> None:
+        self.recording = ""
+        self.views = 0
+        self.skipped = 0
+        self.reasons: deque[str] = deque(maxlen=MAX_REASONS)
+
+    def update(self, playback: Playback) -> None:
+        """Take account of how far it is."""
+        self.recording = playback.recording
+        self.views = playback.views
+        self.skipped = playback.skipped
+        self.reasons.extend(playback.reasons)
+
+
 class Observer:
     """Follows a drive from outside. The agent's frame has its origin in the robot's first pose,
     until a map is recalled.
@@ -70,7 +93,8 @@ class Observer:
     def __init__(self) -> None:
         self.town: TrueTown | None = None
         self.start: Pose | None = None
-        self.travelled_m = 0.0
+        self.played = Played()
+        self._true_m = 0.0
         self.place_m = (0.0, 0.0)
         self.has_ended = False
         self._share_of_time = 0.0
@@ -79,7 +103,7 @@ class Observer:
         self._goals = GoalProgress()
         self._explored_ns = 0
         self._explored_m = 0.0
-        self._began_ns = 0
+        self._began_ns: int | None = None
         self._now_ns = 0
         self._true = Track()
         self._estimate = Track()
@@ -105,19 +129,27 @@ class Observer:
                 self._on_delta(message)
             case TrueTown():
                 self.town = message
+            case Playback():
+                self.played.update(message)
+                self._tick(message.stamp_ns, message.progress)
+
+    def _tick(self, stamp_ns: int, share: float) -> None:
+        """Note that so much of the drive's time has passed."""
+        if self._began_ns is None:
+            self._began_ns = stamp_ns
+        self._now_ns = max(self._now_ns, stamp_ns)
+        self.has_ended = share >= 1.0
+        self._share_of_time = share
 
     def _on_pose(self, true: TruePose) -> None:
         pose = true.pose
         if self.start is None:
             self.start = pose
-            self._began_ns = true.stamp_ns
 
         self.place_m = (pose.x_m, pose.y_m)
         self._true.add(true.stamp_ns, pose.x_m, pose.y_m)
-        self._now_ns = max(self._now_ns, true.stamp_ns)
-        self.travelled_m = true.travelled_m
-        self.has_ended = true.progress >= 1.0
-        self._share_of_time = true.progress
+        self._true_m = true.travelled_m
+        self._tick(true.stamp_ns, true.progress)
 
     def _on_self_motion(self, motion: SelfMotion) -> None:
         motions = motion.motions.numpy()
@@ -146,6 +178,18 @@ class Observer:
                 position_m = np.array([[operation.x_m, operation.y_m]])
                 ((x_m, y_m),) = self._frame.from_start(position_m).tolist()
                 self._estimate.add(delta.stamp_ns, x_m, y_m)
+
+    @property
+    def has_begun(self) -> bool:
+        """Return whether the robot has been somewhere, or a recording is being played."""
+        return self._began_ns is not None
+
+    @property
+    def travelled_m(self) -> float:
+        """Return the distance that the robot has travelled: by self-motion if nobody knows the true
+        one.
+        """
+        return self._fused.travelled_m if self.start is None else self._true_m
 
     @property
     def recalled(self) -> str:
@@ -179,7 +223,8 @@ class Observer:
     @property
     def elapsed_s(self) -> float:
         """Return the time of the drive so far, by the stamps of its messages."""
-        elapsed_ns = self._now_ns - self._began_ns
+        began_ns = self._now_ns if self._began_ns is None else self._began_ns
+        elapsed_ns = self._now_ns - began_ns
         return max(0, elapsed_ns) / 1e9
 
     def to_world(self, points_m: Floats) -> Floats:

@@ -10,6 +10,7 @@ class Outcome(enum.Enum):
     """How a drive ended. The value is what `summary.json` holds as `ended_by`.
 
     ROUTE_COMPLETE: every goal is reached or, where there was none, the time of the drive is over.
+    RECORDING_OVER: all of a recording was played.
     MODULE_FAILED: a process cannot run, as it dies again and again, or the disk takes no more.
     STALLED: nothing happens any more. STUCK: time passes, and the robot stays where it is.
     TOO_SLOW: the same, as the machine is too slow for the robot to move safely. OUT_OF_ENERGY: the
@@ -17,6 +18,7 @@ class Outcome(enum.Enum):
     """
 
     ROUTE_COMPLETE = "route complete"
+    RECORDING_OVER = "recording over"
     INTERRUPTED = "interrupted"
     TIME_LIMIT = "time limit"
     MODULE_FAILED = "module failed"
@@ -29,7 +31,7 @@ class Outcome(enum.Enum):
     def exit_code(self) -> int:
         """Return what `cogmap run` exits with."""
         match self:
-            case Outcome.ROUTE_COMPLETE:
+            case Outcome.ROUTE_COMPLETE | Outcome.RECORDING_OVER:
                 return 0
             case Outcome.INTERRUPTED:
                 return 130

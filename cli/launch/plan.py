@@ -27,7 +27,7 @@ from cogmap.services.sim.odometry import FUSED
 OBSERVER = "observer"
 RECORDER = "recorder"
 ROUTER = "router"
-START_FIRST = (ROUTER, "sim", RECORDER)
+START_FIRST = (ROUTER, *registry.BODIES, RECORDER)
 CONFIG_NAME = "config.toml"
 STATE_NAME = "state"
 MEMORY_NAME = "memory.db"
@@ -53,7 +53,8 @@ class Choices:
     such as it knows. With `explore_s` it explores for so long, and then drives to `goals`, or home.
     With `energy` its battery runs down. `without` are the modules that somebody else starts.
     `own_router` is whether the run starts one. `memory` is the database of what was learned in
-    earlier runs, a new one where it is None.
+    earlier runs, a new one where it is None. `recording`, FORMAT:PATH, is played in the place of
+    the simulation, `speed` times as fast as it was recorded.
     """
 
     seed: int | None = None
@@ -69,6 +70,13 @@ class Choices:
     goals: Sequence[Goal] = ()
     memory: Path | None = None
     energy: bool = False
+    recording: str = ""
+    speed: float | None = None
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """Return the modules that take part."""
+        return registry.taking_part(registry.PLAYER if self.recording else registry.SIM)
 
 
 def effective(base: Sections, choices: Choices, observer: bool) -> Sections:
@@ -92,6 +100,9 @@ def effective(base: Sections, choices: Choices, observer: bool) -> Sections:
 
 def _has_laps(base: Sections, choices: Choices) -> bool:
     """Decide whether the agent's goals are the corners of the loop."""
+    if choices.recording:
+        return False
+
     sim = base.get("sim", {})
     has_goals = choices.goals or choices.explore_s is not None or choices.tour
     is_given = has_goals or "goals" in base.get("workspace", {}) or "trajectory" in sim
@@ -107,6 +118,10 @@ def _chosen(base: Sections, choices: Choices, observer: bool) -> Sections:
     sections["run"].setdefault("participants", participants(choices, observer))
     if choices.energy:
         sections["run"]["energy"] = True
+
+    if choices.recording:
+        _give_recording(sections, choices)
+        return sections
 
     sim = sections["sim"]
     if choices.seed is not None:
@@ -125,6 +140,15 @@ def _chosen(base: Sections, choices: Choices, observer: bool) -> Sections:
         if not choices.tour:
             _give_goals(sections, choices)
     return sections
+
+
+def _give_recording(sections: Sections, choices: Choices) -> None:
+    """Name what is to be played. The agent explores, though nothing that it does moves anything."""
+    player = sections["player"]
+    player["recording"] = choices.recording
+    if choices.speed is not None:
+        player["speed"] = choices.speed
+    sections["planning"].setdefault("explore", True)
 
 
 def _give_goals(sections: Sections, choices: Choices) -> None:
@@ -165,7 +189,7 @@ def participants(choices: Choices, observer: bool) -> dict[str, int]:
     """Count the instances that take part, by name: every module, the workers, the recorder, and an
     `observer`.
     """
-    members = dict.fromkeys(registry.MODULES, 1) | {REPLICATED: choices.codelets}
+    members = dict.fromkeys(choices.modules, 1) | {REPLICATED: choices.codelets}
     if choices.record:
         members[RECORDER] = 1
     if observer:
@@ -202,7 +226,7 @@ def programs(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[
 
     memory = str(choices.memory or folder / MEMORY_NAME)
     kept = ["--state", str(folder / STATE_NAME), "--memory", memory]
-    for name in registry.MODULES:
+    for name in choices.modules:
         if name in choices.without:
             continue
         instances = [name]

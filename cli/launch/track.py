@@ -89,10 +89,13 @@ class Track:
 
 
 class PathIntegrator:
-    """Path integration alone: measured speeds add up to a path from the origin, heading along x."""
+    """Path integration alone: measured speeds add up to a path from the origin, heading along x,
+    and to the distance `travelled_m`, there and back.
+    """
 
     def __init__(self) -> None:
         self.track = Track()
+        self.travelled_m = 0.0
         self._x_m = 0.0
         self._y_m = 0.0
         self._heading_rad = 0.0
@@ -115,6 +118,7 @@ class PathIntegrator:
         midpoint_rad = self._heading_rad + turn_rad / 2
         distance_m = speed_m_s * dt_s
 
+        self.travelled_m += abs(distance_m)
         self._x_m += distance_m * math.cos(midpoint_rad)
         self._y_m += distance_m * math.sin(midpoint_rad)
         self._heading_rad += turn_rad

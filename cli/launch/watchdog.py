@@ -23,7 +23,8 @@ class Situation:
 
     `missing` are the modules that are not ready, `halted_by` is the reason of the newest of so many
     `commands`, NONE where it moves the wheels. `is_charging` is whether its battery is charged now,
-    `is_out` whether that is empty.
+    `is_out` whether that is empty. `is_recorded` is whether a recording is played, in which nothing
+    moves the robot.
     """
 
     now_s: float
@@ -34,6 +35,7 @@ class Situation:
     missing: Sequence[str] = ()
     is_charging: bool = False
     is_out: bool = False
+    is_recorded: bool = False
 
 
 class Watchdog:
@@ -48,7 +50,8 @@ class Watchdog:
 
         It is stalled after STALLED_S in which its time stood still, and stuck after STUCK_S of its
         own time in which the robot, though it has a route, stayed within MIN_MOVE_M of a place: one
-        that backs away and returns gets nowhere. One that stays to be charged is not stuck.
+        that backs away and returns gets nowhere. One that stays to be charged is not stuck, nor is
+        one in a recording.
         """
         if situation.is_out:
             return Ending(Outcome.OUT_OF_ENERGY, "the robot's battery is empty: see map.png")
@@ -66,7 +69,8 @@ class Watchdog:
             return Ending(Outcome.STALLED, _stalled(situation))
 
         has_moved = math.dist(situation.place_m, moved.place_m) >= MIN_MOVE_M
-        has_reason = situation.is_charging or situation.halted_by in WAITS
+        may_stay = situation.is_charging or situation.is_recorded
+        has_reason = may_stay or situation.halted_by in WAITS
         if has_moved or has_reason:
             self._moved = situation
         elif situation.drive_s - moved.drive_s >= STUCK_S:

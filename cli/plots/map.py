@@ -81,6 +81,7 @@ def _dress(
             observer.true_path_m,
             observer.wheels_path_m,
             observer.fused_path_m,
+            observer.estimated_path_m,
         ]
     )
     if len(every):
@@ -108,10 +109,8 @@ def _dress(
     axes.set_xlabel("x, metres east", color=FAINT)
     axes.set_ylabel("y, metres north", color=FAINT)
 
-    driven = (
-        f"Town {metrics.seed}, driven through for {metrics.distance_m:.0f} m "
-        f"in {metrics.drive_s:.0f} s"
-    )
+    place = metrics.recording or f"Town {metrics.seed}"
+    driven = f"{place}, driven through for {metrics.distance_m:.0f} m in {metrics.drive_s:.0f} s"
     learned = f"{metrics.objects} buildings and {metrics.road_m2:.0f} m² of street learned"
     errors = (
         f"position error {metrics.estimate.mean_m:.2f} m on average; "

@@ -18,12 +18,13 @@ SIM = "sim"
 def check_inputs(sections: Sections, choices: Choices) -> None:
     """Raise the CogmapError with which a module of the drive would end as it starts, for its file
     of schemes, the settings of the simulation, the extract of its town, or the database of
-    long-term memory. Inputs of modules that somebody else starts are not checked.
+    long-term memory; a recording is opened before. Inputs of modules that somebody else starts are
+    not checked.
     """
     if PROCEDURAL not in choices.without:
         registry.build(PROCEDURAL, sections)
 
-    if SIM not in choices.without:
+    if SIM in choices.modules and SIM not in choices.without:
         settings = config.typed(sections, SIM, Config)
         check(settings, config.typed(sections, SECTION, Run))
         if settings.town.startswith(towns.OSM):  # one from a seed takes seconds, and cannot fail

@@ -16,10 +16,13 @@ from cogmap.cli.run.options import (
     codelets_option,
     energy_option,
     explore_option,
+    formats_of_recordings,
     goals_option,
     laps_option,
     lockstep_option,
+    recording_option,
     seed_option,
+    speed_option,
     tour_option,
     town_option,
 )
@@ -27,7 +30,7 @@ from cogmap.runtime import config
 from cogmap.services import registry
 
 
-@click.command()
+@click.command(epilog=formats_of_recordings())
 @seed_option
 @town_option
 @tour_option
@@ -35,6 +38,8 @@ from cogmap.services import registry
 @goals_option
 @laps_option
 @energy_option
+@recording_option
+@speed_option
 @lockstep_option
 @codelets_option
 @click.option(
@@ -82,6 +87,8 @@ def run(
     goals: Path | None,
     laps: float | None,
     energy: bool,
+    recording: str | None,
+    speed: float | None,
     lockstep: bool,
     codelets: int,
     out: Path | None,
@@ -97,10 +104,12 @@ def run(
     settings: tuple[str, ...],
 ) -> None:
     """Drive the robot through a simulated town: to goals, by routes that it plans, or exploring.
+    With --recording the agent lives through what somebody else's robot sensed.
 
     Starts a router and every module as a process of its own, shows the progress, and writes a log,
     a map and a summary into a new folder, which runs/latest links to. Ends with 0 if every goal
-    was reached, with 130 after Ctrl-C, else with 1; the summary gives the reason.
+    was reached or all of a recording was played, with 130 after Ctrl-C, else with 1; the summary
+    gives the reason.
     """
     with fork_server() as server:
         # While the server imports what it is to fork, this process imports what it needs itself.
@@ -124,6 +133,8 @@ def run(
             goals=() if goals is None else read_goals(goals),
             memory=None if memory is None else memory.resolve(),
             energy=energy,
+            recording=recording or "",
+            speed=speed,
         )
         start = Start(
             choices=choices,

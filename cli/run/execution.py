@@ -19,12 +19,13 @@ from cogmap.cli.launch.display import Display, display_on
 from cogmap.cli.launch.drive import Drive
 from cogmap.cli.launch.forking.client import ForkServer
 from cogmap.cli.launch.plan import CONFIG_NAME, Choices, effective
-from cogmap.cli.run import summary
+from cogmap.cli.run import recordings, summary
 from cogmap.cli.run.checks import check_inputs
 from cogmap.cli.run.options import AROUND_S, LAP_LIMIT_S
 from cogmap.errors import ConfigError, StorageError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
+from cogmap.services.player import formats
 from cogmap.services.sim.layout.towns import BLOCKS, LOOP, OSM
 
 RUNS = Path("runs")
@@ -51,10 +52,18 @@ def run_drive(start: Start, server: ForkServer | None) -> int:
     Raises UsageError if it cannot be done so, and StorageError if a file cannot be written.
     """
     stop = Stop()
-    choices = start.choices
+    choices = recordings.chosen(start.choices, start.given)
     console = Console(stderr=start.as_json)
-    sections = effective(start.given, choices, observer=True)
+    recording = formats.opened(choices.recording) if choices.recording else None
+    given = start.given
+    if recording is not None:
+        given = recordings.with_settings(given, recording)
+    sections = effective(given, choices, observer=True)
     check_inputs(sections, choices)
+    if recording is not None:
+        default_s = recordings.limit_s(recording, sections)
+    else:
+        default_s = default_limit_s(sections["sim"], choices)
     if choices.own_router:
         check_free(start.endpoint)
 
@@ -66,7 +75,7 @@ def run_drive(start: Start, server: ForkServer | None) -> int:
         choices,
         sections,
         began_s=BEGAN_S,
-        limit_s=start.time_limit_s or default_limit_s(sections["sim"], choices),
+        limit_s=start.time_limit_s or default_s,
         limits_start=start.time_limit_s is not None,
         server=server,
     )
@@ -100,11 +109,11 @@ def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
 
 
 def _introduce(screen: Display, drive: Drive) -> None:
-    """Show the town, the folder and the goals, and what the user has to start."""
+    """Show the town or the recording, the folder and the goals, and what the user has to start."""
     sim = drive.sections["sim"]
     names = {LOOP: f"town {sim['seed']}", BLOCKS: f"town {sim['seed']} of blocks"}
     town = names.get(sim["town"], f"the town in {sim['town'].removeprefix(OSM)}")
-    screen.show(f"{town}, files in {drive.folder}")
+    screen.show(f"{drive.choices.recording or town}, files in {drive.folder}")
 
     if drive.goals:
         order = "in order" if drive.sections["workspace"]["in_order"] else "in an order of its own"

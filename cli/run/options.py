@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from cogmap.cli.options import FiniteRange
+from cogmap.services.player.formats import FORMATS
 
 LAP_LIMIT_S = 85.0
 """The wall-clock time that a lap may take, its end included; it takes some 60 s."""
@@ -68,8 +69,24 @@ codelets_option = click.option(
     show_default=True,
     help="How many processes run codelets.",
 )
+recording_option = click.option(
+    "--recording",
+    metavar="FORMAT:PATH",
+    help="Play a recording in the place of the simulation; the formats are listed below.",
+)
+speed_option = click.option(
+    "--speed",
+    type=FiniteRange(0.01, 100),
+    help="Play the recording this many times as fast as it was recorded.  [default: 1]",
+)
 lockstep_option = click.option(
     "--lockstep/--real-time",
     help="In lockstep the simulation waits for every module: one seed, the same bytes.  "
     "[default: real time]",
 )
+
+
+def formats_of_recordings() -> str:
+    """List the formats of recordings, for the end of the help."""
+    rows = [f"  {name + ':PATH':<15} {each.path}" for name, each in FORMATS.items()]
+    return "\n".join(["\b", "Recordings:", *rows])

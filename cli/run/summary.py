@@ -36,7 +36,7 @@ def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
     log = Recording.read(drive.folder / LOG_NAME) if drive.choices.record else None
     metrics = RunMetrics(
         **msgspec.structs.asdict(of_drive),
-        completed=ending.outcome is Outcome.ROUTE_COMPLETE,
+        completed=ending.outcome in {Outcome.ROUTE_COMPLETE, Outcome.RECORDING_OVER},
         ended_by=ending.outcome.value,
         reason=ending.reason,
         seed=drive.sections["sim"]["seed"],
@@ -91,6 +91,8 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
     if metrics.shortcut_m:
         driven = f"{driven}, {metrics.shortcut_m:.0f} m of the way through streets new to it"
     rows = [("driven", driven)]
+    if metrics.recording:
+        rows.append(("recording", _played(metrics)))
 
     if metrics.unreached:
         sentences = [escape(f"{name}: {reason}") for name, reason in metrics.unreached.items()]
@@ -123,6 +125,15 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         shown = "ran out" if energy.ran_out else levels
         rows.append(("energy", f"{shown}; charged {energy.charged} times"))
     return rows
+
+
+def _played(metrics: DriveMetrics) -> str:
+    """Write what was played, and what of it was left out."""
+    played = f"{metrics.recording}, {metrics.views} views; commands moved nothing in it"
+    if not metrics.skipped:
+        return played
+    reasons = [escape(reason) for reason in metrics.skipped_reasons]
+    return "\n".join([f"{played}; {metrics.skipped} left out:", *reasons])
 
 
 def _first(words: Sequence[str], separator: str) -> str:

@@ -47,12 +47,14 @@ class MotorModule:
 
     The plan is that of the graph, as it is when the pose is committed. In lockstep a command waits
     for what `LockstepGate` names. A pose that is published again, as the simulator publishes a
-    frame again that nobody answered, is answered at once.
+    frame again that nobody answered, is answered at once. In a recording nothing can be moved:
+    programs start and end, and each command says so.
     """
 
     def __init__(self, config: Config, graph: Graph, run: Run) -> None:
         self._config = config
         self._is_lockstep = run.lockstep
+        self._is_recorded = run.has_any("player")
         self._gate = LockstepGate()
         self._stuck = StuckDetector(config.stuck_after_s)
         self._escape = Escape()
@@ -225,6 +227,8 @@ class MotorModule:
         age_ns = self._age_ns(stamp_ns)
         self._execution.take(estimate.plan, estimate.pose)
         aim = self._execution.aim(stamp_ns, estimate.pose)
+        if self._is_recorded:
+            return self._remember(halted(stamp_ns, SpeedLimit.RECORDING, age_ns))
         if not isinstance(aim, Aim):
             return self._remember(halted(stamp_ns, aim, age_ns))
 

@@ -38,6 +38,7 @@ class ProceduralMemory:
     def __init__(self, config: Config, graph: Graph, run: Run) -> None:
         self._config = config
         self._is_lockstep = run.lockstep
+        self._is_recorded = run.has_any("player")
         self._graph = graph
         path = Path(config.schemes) if config.schemes else BUILT_IN
         self._schemes = load(path)
@@ -92,8 +93,12 @@ class ProceduralMemory:
         return self._due()
 
     def on_action(self, action: Action) -> list[Behaviours]:
-        """Note that a scheme is executed, or that none was active enough."""
-        self._reliability.on_action(action)
+        """Note that a scheme is executed, or that none was active enough.
+
+        In a recording no action moves anything: what follows is no success or failure of it.
+        """
+        if not self._is_recorded:
+            self._reliability.on_action(action)
         self._guidance.on_action(action)
         if self._unanswered_cycle is not None and action.cycle >= self._unanswered_cycle:
             self._unanswered_cycle = None

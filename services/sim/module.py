@@ -27,9 +27,12 @@ _PERCEPT_LEVEL = (*_ALWAYS, topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS)
 
 
 def build(config: Config, instance: str = "sim", run: Run = REAL_TIME) -> Module:
-    """Return the module `sim`. Raises ConfigError as `check` does, and UsageError if images are to
-    be rendered without pybullet.
+    """Return the module `sim`, which does nothing where a recording is played in its place. Raises
+    ConfigError as `check` does, and UsageError if images are to be rendered without pybullet.
     """
+    if run.has_any("player"):
+        return Module("sim", instance)
+
     check(config, run)
     module = Module("sim", instance)
     trajectory = config.trajectory

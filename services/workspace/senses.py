@@ -20,7 +20,7 @@ MAX_SCANS = 16
 MAX_ENERGIES = 16
 MAX_SCAN_AGE_NS = 100_000_000
 """In real time, how much older than its view a scan may be: half of the time between two views."""
-SCANNERS = ("sim", "sensory")
+SCANNERS = ("sim", "player", "sensory")
 """The modules that publish range scans: of percept-level sensing, and of cameras."""
 
 

@@ -76,7 +76,7 @@ def test_no_module_subscribes_to_the_truth(over_zenoh: OverZenoh) -> None:
 
     found = {process.member.module for process in system.processes if process.member}
     assert found >= set(registry.MODULES)
-    assert names(system, Role.PUBLISHES, topics.TRUE_POSE) == ["sim"]
+    assert names(system, Role.PUBLISHES, topics.TRUE_POSE) == ["player", "sim"]
     for topic in TRUTH:
         assert names(system, Role.SUBSCRIBES, topic) == []
 

@@ -240,3 +240,15 @@ def test_a_self_motion_of_another_shape_is_refused_by_name() -> None:
 
     with pytest.raises(MessageError, match="rows of 5 columns"):
         module_ahead().feed(motion)
+
+
+def test_in_a_recording_programs_start_and_every_command_says_that_it_moves_nothing() -> None:
+    module = module_ahead(Run(participants={"player": 1}))
+    (program,) = module.feed(action_of())
+
+    command = command_after(module, pose_delta())
+
+    assert isinstance(program, MotorProgram)
+    assert program.action == ActionName.FOLLOW_PLAN
+    assert (command.left_wheel_rad_s, command.right_wheel_rad_s) == (0.0, 0.0)
+    assert command.halted_by is SpeedLimit.RECORDING

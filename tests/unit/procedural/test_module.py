@@ -281,3 +281,19 @@ def test_guidance_that_was_learned_is_journaled_and_known_after_a_restart() -> N
     assert len(learned) >= 10
     assert isinstance(compact, Behaviours)
     assert compact.learned == learned
+
+
+@pytest.mark.parametrize(("participant", "executions"), [("sim", 1), ("player", 0)])
+def test_what_follows_an_action_in_a_recording_teaches_nothing_about_its_scheme(
+    participant: str, executions: int
+) -> None:
+    memory = _memory(Run(participants={participant: 1}))
+    memory.pose(1)
+    memory.broadcast(1)
+    memory.action(1, "follow_route")
+
+    # Long after, without the result that was expected.
+    memory.pose(1000)
+    found = _by_scheme(memory.broadcast(1000))
+
+    assert found["follow_route"].executions == executions

@@ -15,6 +15,7 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.cognition import Competition
 from cogmap.schemas.graph import Delta, DropNode, Operation, Phase
 from cogmap.schemas.nodes import Goal
+from cogmap.schemas.process import Playback
 from cogmap.schemas.sensing import Odometry, Pose, SelfMotion, TruePose
 from cogmap.testing import agent
 from cogmap.testing import odometry as wheels
@@ -276,3 +277,44 @@ def test_a_track_keeps_its_order_when_an_old_position_comes_late() -> None:
 
     assert track.stamps_ns.tolist() == [1, 3]
     assert covered.tolist() == [False, True, True, True, False]
+
+
+def playback(tick: int, progress: float, skipped: int = 0, *reasons: str) -> Playback:
+    return Playback(
+        stamp_ns=tick * TICK_NS,
+        recording="kitti:07",
+        views=tick + 1 - skipped,
+        skipped=skipped,
+        progress=progress,
+        reasons=list(reasons),
+    )
+
+
+def test_a_recording_without_truth_is_followed_by_what_was_played() -> None:
+    observer = Observer()
+    assert not observer.has_begun
+
+    observer.update(playback(0, 0.0))
+    observer.update(self_motion(1, 1.0))
+    observer.update(estimate(1, 0.05, 0.0))
+    observer.update(playback(1, 0.5))
+
+    assert observer.has_begun
+    assert observer.start is None
+    assert not observer.has_ended
+    assert observer.progress == 0.5
+    assert observer.elapsed_s == pytest.approx(TICK_S)
+    assert observer.travelled_m == pytest.approx(TICK_S)
+    assert observer.errors().estimate_m.size == 0
+    assert observer.estimated_path_m.tolist() == [[0.05, 0.0]]
+
+
+def test_what_could_not_be_played_is_kept_and_the_end_of_it_ends_the_drive() -> None:
+    observer = Observer()
+    observer.update(playback(0, 0.0))
+    observer.update(playback(2, 1.0, 1, "000001.png is no whole picture"))
+
+    assert observer.has_ended
+    assert observer.played.recording == "kitti:07"
+    assert (observer.played.views, observer.played.skipped) == (2, 1)
+    assert list(observer.played.reasons) == ["000001.png is no whole picture"]

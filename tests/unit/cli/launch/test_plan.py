@@ -188,7 +188,7 @@ def instances(folder: Path, choices: Choices) -> set[str]:
 
 def test_each_module_is_a_process_and_each_worker_one_more(tmp_path: Path) -> None:
     router, *names = [program.instance for program in started(tmp_path, Choices(codelets=2))]
-    modules = set(registry.MODULES) - {"codelets"}
+    modules = set(registry.taking_part()) - {"codelets"}
     workers = {"codelets-1", "codelets-2"}
 
     assert router == ROUTER
@@ -201,6 +201,20 @@ def test_router_simulation_and_recorder_are_started_first(tmp_path: Path) -> Non
     assert names[:3] == [ROUTER, "sim", RECORDER]
 
 
+def test_a_recording_is_played_in_the_place_of_the_simulation(tmp_path: Path) -> None:
+    choices = Choices(recording="kitti:/drives/07", speed=4.0)
+    names = [program.instance for program in started(tmp_path, choices)]
+    sections = configured(choices)
+
+    assert names[:3] == [ROUTER, "player", RECORDER]
+    assert "sim" not in names
+    assert "sim" not in sections["run"]["participants"]
+    assert sections["run"]["participants"]["player"] == 1
+    assert sections["player"] == {"recording": "kitti:/drives/07", "speed": 4.0}
+    assert sections["workspace"]["goals"] == []
+    assert sections["planning"]["explore"]
+
+
 def test_no_module_joins_before_it_is_recorded(tmp_path: Path) -> None:
     every = started(tmp_path, Choices())
     free = {program.instance for program in every if not program.is_held}
@@ -210,7 +224,7 @@ def test_no_module_joins_before_it_is_recorded(tmp_path: Path) -> None:
 
 def test_modules_of_ones_own_are_not_started_and_waited_for(tmp_path: Path) -> None:
     choices = Choices(without=["epam", "codelets"], codelets=2)
-    every = {*registry.MODULES, RECORDER, ROUTER}
+    every = {*registry.taking_part(), RECORDER, ROUTER}
 
     members = participants(choices, observer=True)
 

@@ -95,6 +95,13 @@ def test_a_robot_that_is_charged_is_not_stuck() -> None:
     assert after(10 * STUCK_S, 10 * STUCK_S, is_charging=True) is None
 
 
+def test_a_robot_that_stands_in_a_recording_is_not_stuck() -> None:
+    halted = {"halted_by": SpeedLimit.RECORDING, "is_recorded": True}
+
+    assert after(10 * STUCK_S, 10 * STUCK_S, **halted) is None
+    assert after(STALLED_S, 0.0, **halted) is not None, "a player that is silent is stalled"
+
+
 def test_a_robot_that_is_out_of_energy_ends_the_drive() -> None:
     watchdog = Watchdog()
     ending = watchdog.check(Situation(0.0, 10.0, (5.0, 2.0), commands=50, is_out=True))
@@ -108,5 +115,6 @@ def test_only_a_drive_to_its_end_exits_with_0() -> None:
     codes = {outcome: outcome.exit_code for outcome in Outcome}
 
     assert codes.pop(Outcome.ROUTE_COMPLETE) == 0
+    assert codes.pop(Outcome.RECORDING_OVER) == 0
     assert codes.pop(Outcome.INTERRUPTED) == 130
     assert set(codes.values()) == {1}

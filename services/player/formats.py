@@ -1,0 +1,66 @@
+"""The one table of formats: what recordings there are, and what opens each.
+
+What opens a recording is imported when one is opened.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from pkgutil import resolve_name
+from typing import TYPE_CHECKING, NamedTuple
+
+from cogmap.errors import UsageError
+from cogmap.hints import did_you_mean
+
+if TYPE_CHECKING:
+    from cogmap.services.player.recording import Recording
+
+
+class Format(NamedTuple):
+    """What the path of a recording is, in words, and the import string of the function that opens
+    it: that takes a path, and raises UsageError if it cannot be played.
+    """
+
+    path: str
+    opener: str
+
+
+FORMATS = {
+    "kitti": Format(
+        "folder of a KITTI odometry sequence: calib.txt, image_0 and image_1",
+        "cogmap.services.player.stereo:kitti",
+    ),
+}
+
+
+class Named(NamedTuple):
+    """The name of a format, and the path of a recording."""
+
+    format: str
+    path: Path
+
+    @property
+    def title(self) -> str:
+        """Return the name by which people know it: its folder may be anywhere."""
+        return f"{self.format}:{self.path.resolve().name}"
+
+
+def named(given: str) -> Named:
+    """Read FORMAT:PATH. Raises UsageError if it is something else, or there is no such format."""
+    name, colon, path = given.partition(":")
+    known = ", ".join(FORMATS)
+    if not (colon and path):
+        raise UsageError(
+            f"{given!r} names no recording: write it as FORMAT:PATH, where FORMAT is one of {known}"
+        )
+    if name not in FORMATS:
+        hint = did_you_mean(name, FORMATS, f"there are {known}")
+        raise UsageError(f"no recording has the format {name!r}: {hint}")
+    return Named(name, Path(path))
+
+
+def opened(given: str) -> Recording:
+    """Open the recording FORMAT:PATH. Raises UsageError if it cannot be played."""
+    name, path = named(given)
+    recording: Recording = resolve_name(FORMATS[name].opener)(path)
+    return recording

@@ -1,0 +1,70 @@
+"""A recording in lockstep: it moves on by one view for each motor command. Pure."""
+
+from __future__ import annotations
+
+from cogmap.schemas.base import Message
+from cogmap.schemas.process import Clock
+from cogmap.schemas.sensing import MotorCommand
+from cogmap.services.player.playhead import Playhead
+
+# How often the wait for a command is looked at: a tenth of REPEAT_AFTER_NS.
+REPEAT_CHECK_NS = 1_000_000_000
+
+REPEAT_AFTER_NS = 10_000_000_000
+"""Wall time without a motor command after which a view is published again, as the simulation does:
+no cycle of a loaded machine takes as long, and a module that was restarted is back within it.
+"""
+
+
+class Lockstep:
+    """Plays the next view for each command that answers the last one, until the recording is over.
+
+    What a command says moves nothing.
+    """
+
+    def __init__(self, playhead: Playhead) -> None:
+        self._playhead = playhead
+        self._view_ns: int | None = None
+        self._sensed: list[Message] = []
+        self._timed_view_ns: int | None = None
+        self._waiting_since_ns = 0
+
+    def on_start(self) -> list[Message]:
+        """Return what really stood there, if that is known, and the first view."""
+        return [*self._playhead.town(), *self._advance()]
+
+    def on_command(self, command: MotorCommand) -> list[Message] | None:
+        """Return the next view, after what was sensed up to it, or the end; None if `command`
+        answers another view than the last, or the last once more.
+        """
+        if command.stamp_ns != self._view_ns or self._playhead.is_over:
+            return None
+        return self._advance()
+
+    def on_timer(self, wall_ns: int) -> list[Message]:
+        """Return what was sensed last once more if no command has answered it for REPEAT_AFTER_NS
+        of wall time: a module that was killed may have lost it.
+        """
+        if self._view_ns is None or self._playhead.is_over:
+            return []
+
+        if self._timed_view_ns != self._view_ns:
+            self._timed_view_ns = self._view_ns
+            self._waiting_since_ns = wall_ns
+
+        if wall_ns - self._waiting_since_ns < REPEAT_AFTER_NS:
+            return []
+
+        self._waiting_since_ns = wall_ns
+        return self._sensed
+
+    def _advance(self) -> list[Message]:
+        """Return what is sensed up to the next view, or, where there is none, the end."""
+        step = self._playhead.advance()
+        if step is None:
+            return [self._playhead.end()]
+
+        self._view_ns = step.stamp_ns
+        self._sensed = [*step.before, *step.view]
+        clock = Clock(stamp_ns=step.stamp_ns, rate=0.0)
+        return [*step.before, clock, *step.truth, *step.view]

@@ -1,0 +1,40 @@
+"""What a player plays: a recording as messages, view by view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from cogmap.runtime.config import Sections
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import Pose, TrueTown
+
+LEAD_NS = 1_000_000_000
+"""The time of the first that was sensed: late enough for what led to it to be after 0."""
+
+
+class Recording(Protocol):
+    """Views in order of time, and what was sensed between them, stamped in ns since the run began.
+
+    `settings` are those that such a recording asks of the modules, where the user sets none: which
+    senses the robot has, and what they err by.
+    """
+
+    settings: Sections
+
+    @property
+    def stamps_ns(self) -> Sequence[int]:
+        """Return the time of each view, increasing; there is one at least."""
+
+    @property
+    def true_poses(self) -> Sequence[Pose | None]:
+        """Return where the robot really was at each view, None where nobody knows."""
+
+    def before(self, number: int) -> list[Message]:
+        """Return what was sensed after the view before this one, in order of time."""
+
+    def view(self, number: int) -> list[Message]:
+        """Return what was sensed in a view. Raises UsageError if it cannot be read."""
+
+    def town(self) -> TrueTown | None:
+        """Return what really stood there; None if nobody knows."""

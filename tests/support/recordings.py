@@ -1,0 +1,65 @@
+"""Small recordings, made in a test."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from cogmap.errors import UsageError
+from cogmap.runtime.config import Sections
+from cogmap.schemas.base import Message
+from cogmap.schemas.sensing import Pose, TrueTown
+from cogmap.testing import PERIOD_NS, odometry, percepts, stamp_ns
+
+CAMERA = "55 0 31.5 {} 0 55 23.5 0 0 0 1 0"
+SIZE_PX = (48, 64)
+
+
+@dataclass
+class Walk:
+    """Views of percepts, the wheels before each, and true poses 1 m apart. Those views whose number
+    is `broken` cannot be read; nobody knows the true poses at those `unknown`.
+    """
+
+    views: int
+    broken: Collection[int] = ()
+    unknown: Collection[int] = ()
+    settings: Sections = field(default_factory=dict)
+
+    @property
+    def stamps_ns(self) -> list[int]:
+        return [stamp_ns(number) for number in range(self.views)]
+
+    @property
+    def true_poses(self) -> list[Pose | None]:
+        poses = [Pose(x_m=number, y_m=0.0, heading_rad=0.0) for number in range(self.views)]
+        return [None if number in self.unknown else pose for number, pose in enumerate(poses)]
+
+    def before(self, number: int) -> list[Message]:
+        return [odometry(stamp_ns=stamp_ns(number) - PERIOD_NS // 2)]
+
+    def view(self, number: int) -> list[Message]:
+        if number in self.broken:
+            raise UsageError(f"view {number} is broken: copy it again")
+        return [percepts(number)]
+
+    def town(self) -> TrueTown | None:
+        return TrueTown(seed=0, streets=[], buildings=[])
+
+
+def kitti_folder(folder: Path, pairs: int = 3) -> Path:
+    """Make a KITTI sequence of a camera that stands before a wall of noise, 5.5 m away."""
+    wall = np.random.default_rng(0).integers(0, 256, SIZE_PX, np.uint8)
+    for side, shift_px in (("image_0", 0), ("image_1", -5)):
+        (folder / side).mkdir(parents=True)
+        for number in range(pairs):
+            image = np.roll(wall, shift_px, axis=1)
+            cv2.imwrite(str(folder / side / f"{number:06}.png"), image)
+
+    matrices = (CAMERA.format(0), CAMERA.format(-27.5))
+    (folder / "calib.txt").write_text("".join(f"{matrix}\n" for matrix in matrices))
+    return folder
