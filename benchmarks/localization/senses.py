@@ -7,18 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from benchmarks.localization.delay import Delay
 from cogmap.data.mrclam import Robot
 from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import Percept
-from cogmap.services.sensory.public import SensoryConfig
+from cogmap.services.player.public import Delay, Wheels
 
 TICK_S = 0.2
 STAMP_DECIMALS = 6
 RANGE_NOISE = 0.03
 BEARING_SD_RAD = float(np.deg2rad(1.0))
 MIN_COSINE = 0.1
-NOISE = SensoryConfig()
 
 
 @dataclass(frozen=True)
@@ -66,53 +64,6 @@ def percept_of(row: Floats) -> Percept:
     label = label_of(int(subject))
     cosine = max(float(np.cos(bearing_rad)), MIN_COSINE)
     return seen(label, bearing_rad, depth_m / cosine)
-
-
-class Wheels:
-    """The odometry's commands as self-motion, with the noise that sensory memory gives the town's.
-
-    The paper's noise multiplies the speeds of a movement: here of a second's, so that the rate of
-    the log does not matter.
-    """
-
-    def __init__(self, odometry: Floats) -> None:
-        self._stamps = odometry[:, 0]
-        self._speeds = odometry[:, 1:3]
-
-        turns = odometry[:-1, 2] * np.diff(self._stamps)
-        self._turned = np.concatenate([[0.0], np.cumsum(turns)])
-
-    def heading_rad(self, stamps_s: Floats) -> Floats:
-        """Return the sum of the turns at each of `stamps_s`."""
-        heading: Floats = np.interp(stamps_s, self._stamps, self._turned)
-        return heading
-
-    def rows(self, since_s: float, until_s: float) -> Floats:
-        """Return (n, 5) rows of self-motion, one for each change of the command in between."""
-        begin_s = max(since_s, float(self._stamps[0]))
-        if until_s <= begin_s:
-            return np.empty((0, 5))
-
-        # The commands in between, and since when each holds; equal ones in a row are one.
-        first = max(0, int(np.searchsorted(self._stamps, since_s, "right")) - 1)
-        last = int(np.searchsorted(self._stamps, until_s, "left"))
-        commands = self._speeds[first:last]
-        starts_s = np.append(begin_s, self._stamps[first + 1 : last])
-        differs = (commands[1:] != commands[:-1]).any(axis=1)
-        changes = np.flatnonzero(np.append(True, differs))
-
-        lasts_s = np.diff(np.append(starts_s[changes], until_s))
-        some = lasts_s > 0
-        lasts_s = lasts_s[some]
-        speed, turn_rate = commands[changes[some]].T
-        magnitude = np.abs(speed)
-        speed_sd = NOISE.speed_noise * magnitude / np.sqrt(lasts_s)
-
-        drift_variance = NOISE.drift_rad_per_sqrt_m**2 * magnitude
-        rate_sd = NOISE.turn_noise * turn_rate
-        turn_variance = rate_sd**2 + drift_variance
-        turn_sd = np.sqrt(turn_variance / lasts_s)
-        return np.column_stack([speed, turn_rate, lasts_s, speed_sd, turn_sd])
 
 
 def moments(robot: Robot, skipped_s: tuple[float, float] | None = None) -> Iterator[Moment]:

@@ -25,7 +25,6 @@ from cogmap.cli.run.options import AROUND_S, LAP_LIMIT_S
 from cogmap.errors import ConfigError, StorageError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
-from cogmap.services.player import formats
 from cogmap.services.sim.layout.towns import BLOCKS, LOOP, OSM
 
 RUNS = Path("runs")
@@ -54,8 +53,8 @@ def run_drive(start: Start, server: ForkServer | None) -> int:
     stop = Stop()
     choices = recordings.chosen(start.choices, start.given)
     console = Console(stderr=start.as_json)
-    recording = formats.opened(choices.recording) if choices.recording else None
     given = start.given
+    recording = recordings.opened(choices, given)
     if recording is not None:
         given = recordings.with_settings(given, recording)
     sections = effective(given, choices, observer=True)

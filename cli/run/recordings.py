@@ -7,6 +7,7 @@ from dataclasses import replace
 from cogmap.cli.launch.plan import Choices
 from cogmap.cli.run.options import AROUND_S
 from cogmap.errors import UsageError
+from cogmap.runtime import config
 from cogmap.runtime.config import Sections
 from cogmap.services import registry
 from cogmap.services.player import formats
@@ -46,6 +47,15 @@ def chosen(choices: Choices, given: Sections) -> Choices:
 
     name, path = formats.named(named)
     return replace(choices, recording=f"{name}:{path.resolve()}")
+
+
+def opened(choices: Choices, given: Sections) -> Recording | None:
+    """Open the recording that is chosen, if one is. Raises UsageError if it cannot be played."""
+    if not choices.recording:
+        return None
+
+    player = given.get(registry.PLAYER, {}) | {"recording": choices.recording}
+    return formats.opened(config.typed({registry.PLAYER: player}, registry.PLAYER, Config))
 
 
 def with_settings(given: Sections, recording: Recording) -> Sections:

@@ -17,6 +17,10 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "Empty if the run is simulated."
         ),
     ] = ""
+    robot: Annotated[
+        int,
+        msgspec.Meta(ge=1, description="Number of the robot, where a recording has several."),
+    ] = 1
     speed: Annotated[
         float,
         msgspec.Meta(

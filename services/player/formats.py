@@ -13,12 +13,13 @@ from cogmap.errors import UsageError
 from cogmap.hints import did_you_mean
 
 if TYPE_CHECKING:
+    from cogmap.services.player.config import Config
     from cogmap.services.player.recording import Recording
 
 
 class Format(NamedTuple):
     """What the path of a recording is, in words, and the import string of the function that opens
-    it: that takes a path, and raises UsageError if it cannot be played.
+    it: that takes the path and the configuration, and raises UsageError if it cannot be played.
     """
 
     path: str
@@ -29,6 +30,10 @@ FORMATS = {
     "kitti": Format(
         "folder of a KITTI odometry sequence: calib.txt, image_0 and image_1",
         "cogmap.services.player.stereo:kitti",
+    ),
+    "mrclam": Format(
+        "folder of an MRCLAM set: Robot1_Odometry.dat and the others",
+        "cogmap.services.player.landmark_logs.mrclam:opened",
     ),
 }
 
@@ -59,8 +64,8 @@ def named(given: str) -> Named:
     return Named(name, Path(path))
 
 
-def opened(given: str) -> Recording:
-    """Open the recording FORMAT:PATH. Raises UsageError if it cannot be played."""
-    name, path = named(given)
-    recording: Recording = resolve_name(FORMATS[name].opener)(path)
+def opened(config: Config) -> Recording:
+    """Open the recording that is configured. Raises UsageError if it cannot be played."""
+    name, path = named(config.recording)
+    recording: Recording = resolve_name(FORMATS[name].opener)(path, config)
     return recording

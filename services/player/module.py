@@ -42,7 +42,7 @@ def build(config: Config, instance: str = NAME, run: Run = REAL_TIME) -> Module:
     if not config.recording:
         raise ConfigError("[player] recording is empty: name what is to be played, as FORMAT:PATH")
 
-    recording = formats.opened(config.recording)
+    recording = formats.opened(config)
     playhead = Playhead(recording, formats.named(config.recording).title)
     module.journaling(topics.PLAYBACK, playhead.resume, playhead.played)
 

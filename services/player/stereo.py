@@ -15,6 +15,7 @@ from cogmap.runtime.config import Sections
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import Pose, StereoFrame, TrueTown
+from cogmap.services.player.config import Config
 from cogmap.services.player.recording import LEAD_NS
 
 
@@ -67,7 +68,7 @@ class StereoFrames:
         return None
 
 
-def kitti(folder: Path) -> StereoFrames:
+def kitti(folder: Path, config: Config) -> StereoFrames:
     """Open a KITTI sequence. Raises UsageError."""
     return StereoFrames(read_kitti(folder))
 

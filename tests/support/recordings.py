@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -62,4 +62,24 @@ def kitti_folder(folder: Path, pairs: int = 3) -> Path:
 
     matrices = (CAMERA.format(0), CAMERA.format(-27.5))
     (folder / "calib.txt").write_text("".join(f"{matrix}\n" for matrix in matrices))
+    return folder
+
+
+def mrclam_folder(folder: Path, barcodes: Sequence[int] = (63, 25)) -> Path:
+    """Make an MRCLAM set of one robot, which drives at 0.5 m/s for 2 s and sees `barcodes` thrice,
+    2 m ahead and 0.2 rad to the left.
+    """
+    folder.mkdir(exist_ok=True)
+    odometry = "".join(f"{100 + tick / 10:.3f} 0.5 0.0\n" for tick in range(21))
+    seen = [f"{at_s} {code} 2.0 0.2\n" for at_s in (100.5, 101.0, 101.5) for code in barcodes]
+    truth = "".join(f"{100 + tick / 10:.3f} {tick / 20} 0.0 0.0\n" for tick in range(21))
+    files = {
+        "Barcodes": "1 5\n6 63\n7 25\n",
+        "Landmark_Groundtruth": "6 2.0 0.4 0.0 0.0\n7 3.0 0.6 0.0 0.0\n",
+        "Robot1_Odometry": odometry,
+        "Robot1_Measurement": "".join(seen),
+        "Robot1_Groundtruth": truth,
+    }
+    for name, text in files.items():
+        (folder / f"{name}.dat").write_text(text)
     return folder

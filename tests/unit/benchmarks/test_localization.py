@@ -8,7 +8,6 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from benchmarks.localization.delay import Delay
 from benchmarks.localization.drives import follow
 from benchmarks.localization.loop import LOCALIZATION, LocalizationLoop
 from benchmarks.localization.senses import moments
@@ -17,6 +16,7 @@ from cogmap.data.mrclam import Robot
 from cogmap.errors import CogmapError
 from cogmap.geometry.arrays import Floats
 from cogmap.schemas.graph import Delta, Phase
+from cogmap.services.player.public import Delay
 
 LANDMARKS = {6: (0.0, 4.0), 7: (5.0, 5.0), 8: (6.0, -1.0), 9: (-2.0, -2.0), 10: (2.0, 1.5)}
 RATE_HZ = 10
