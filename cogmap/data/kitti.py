@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.stereo_recording import StereoRecording, checked_stamps, picture
+from cogmap.data.stereo_recording import StereoRecording, checked_stamps, pair_size_px
 from cogmap.data.text import Line, numbered_lines
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats, Indices
@@ -66,7 +66,7 @@ def read_kitti(folder: Path) -> StereoRecording:
             )
 
     numbers, left, right = _pictures(folder, layout)
-    width_px, height_px = _size_px(folder, left, right)
+    width_px, height_px = pair_size_px(zip(left, right, strict=True), folder, GIVE)
     calibration = _calibration(
         folder, matrices[layout.left_camera], matrices[layout.right_camera], width_px, height_px
     )
@@ -163,23 +163,6 @@ def _pictures(folder: Path, layout: _Layout) -> tuple[list[int], list[Path], lis
     left = [folder / layout.left / names[number] for number in numbers]
     right = [folder / layout.right / names[number] for number in numbers]
     return numbers, left, right
-
-
-def _size_px(folder: Path, left: list[Path], right: list[Path]) -> tuple[int, int]:
-    """Return the width and height of the first pair of whole pictures."""
-    for paths in zip(left, right, strict=True):
-        try:
-            sizes = [picture(path).shape[:2] for path in paths]
-        except UsageError:
-            continue  # a broken pair is an error when it is read, not before
-        if sizes[0] != sizes[1]:
-            shown = [f"{width} x {height}" for height, width in sizes]
-            raise UsageError(
-                f"{paths[0]} is {shown[0]}, {paths[1]} is {shown[1]}: give rectified pictures of "
-                "one size, left and right"
-            )
-        return sizes[0][1], sizes[0][0]
-    raise UsageError(f"{folder} has no whole pair of pictures: give {GIVE}, all of it")
 
 
 def _stamps_ns(folder: Path, numbers: list[int]) -> Indices:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -67,6 +68,27 @@ def picture(path: Path) -> Bytes:
     if image.ndim == 3:
         image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
     return image.astype(np.uint8, copy=False)
+
+
+def pair_size_px(pairs: Iterable[tuple[Path, Path]], folder: Path, give: str) -> tuple[int, int]:
+    """Return the width and height of the first pair of whole pictures.
+
+    Raises UsageError, with the remedy to give `give`, if there is none, or its left and right are
+    of other sizes.
+    """
+    for paths in pairs:
+        try:
+            sizes = [picture(path).shape[:2] for path in paths]
+        except UsageError:
+            continue  # a broken pair is an error when it is read, not before
+        if sizes[0] != sizes[1]:
+            shown = [f"{width} x {height}" for height, width in sizes]
+            raise UsageError(
+                f"{paths[0]} is {shown[0]}, {paths[1]} is {shown[1]}: give pictures of one size, "
+                "left and right"
+            )
+        return sizes[0][1], sizes[0][0]
+    raise UsageError(f"{folder} has no whole pair of pictures: give {give}, all of it")
 
 
 def checked_stamps(stamps_ns: Indices, source: Path) -> Indices:

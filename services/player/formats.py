@@ -31,6 +31,18 @@ FORMATS = {
         "folder of a KITTI odometry sequence: calib.txt, image_0 and image_1",
         "cogmap.services.player.stereo:kitti",
     ),
+    "euroc": Format(
+        "folder of a EuRoC sequence, with mav0 in it",
+        "cogmap.services.player.stereo:euroc",
+    ),
+    "images": Format(
+        "folder with left and right, and camera.toml, its calibration",
+        "cogmap.services.player.stereo:images",
+    ),
+    "log": Format(
+        "log of ours, log.mcap: what its robot sensed is sensed again",
+        "cogmap.services.player.own_logs:opened",
+    ),
     "mrclam": Format(
         "folder of an MRCLAM set: Robot1_Odometry.dat and the others",
         "cogmap.services.player.landmark_logs.mrclam:opened",

@@ -66,8 +66,8 @@ class Playhead:
         before: list[Message] = []
         while self._number < len(recording.stamps_ns):
             number = self._number
-            before += recording.before(number)
             try:
+                before += recording.before(number)
                 view = recording.view(number)
             except UsageError as error:
                 self._skipped += 1

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
 from cogmap.runtime.config import Sections
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import Pose, TrueTown
@@ -31,10 +34,24 @@ class Recording(Protocol):
         """Return where the robot really was at each view, None where nobody knows."""
 
     def before(self, number: int) -> list[Message]:
-        """Return what was sensed after the view before this one, in order of time."""
+        """Return what was sensed after the view before this one, in order of time. Raises
+        UsageError if it cannot be read.
+        """
 
     def view(self, number: int) -> list[Message]:
         """Return what was sensed in a view. Raises UsageError if it cannot be read."""
 
     def town(self) -> TrueTown | None:
         """Return what really stood there; None if nobody knows."""
+
+
+def poses_of(rows: Floats) -> list[Pose | None]:
+    """Return (n, 3) rows of x_m, y_m and heading_rad as poses, None where one is NaN."""
+    poses: list[Pose | None] = []
+    for row in rows:
+        if np.isnan(row).any():
+            poses.append(None)
+        else:
+            x_m, y_m, heading_rad = row.tolist()
+            poses.append(Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad))
+    return poses

@@ -8,6 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from cogmap.data.euroc import read_euroc
+from cogmap.data.image_folder import read_images
 from cogmap.data.kitti import read_kitti
 from cogmap.data.stereo_recording import StereoRecording
 from cogmap.geometry.arrays import Bytes
@@ -16,7 +18,7 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.sensing import Pose, StereoFrame, TrueTown
 from cogmap.services.player.config import Config
-from cogmap.services.player.recording import LEAD_NS
+from cogmap.services.player.recording import LEAD_NS, poses_of
 
 
 class StereoFrames:
@@ -40,12 +42,7 @@ class StereoFrames:
         if poses is None:
             return [None] * len(self._recorded)
 
-        found: list[Pose | None] = []
-        for x_m, y_m, heading_rad in poses.tolist():
-            is_known = np.isfinite([x_m, y_m, heading_rad]).all()
-            pose = Pose(x_m=x_m, y_m=y_m, heading_rad=heading_rad) if is_known else None
-            found.append(pose)
-        return found
+        return poses_of(poses)
 
     def before(self, number: int) -> list[Message]:
         """Return nothing: all that was sensed are pictures."""
@@ -66,6 +63,16 @@ class StereoFrames:
     def town(self) -> TrueTown | None:
         """Return nothing: nobody surveyed what stood there."""
         return None
+
+
+def euroc(folder: Path, config: Config) -> StereoFrames:
+    """Open a EuRoC sequence. Raises UsageError."""
+    return StereoFrames(read_euroc(folder))
+
+
+def images(folder: Path, config: Config) -> StereoFrames:
+    """Open a folder of images. Raises UsageError."""
+    return StereoFrames(read_images(folder))
 
 
 def kitti(folder: Path, config: Config) -> StereoFrames:

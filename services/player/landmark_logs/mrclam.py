@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from cogmap.data import mrclam
+from cogmap.data.true_path import poses_at
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.runtime.config import Sections
@@ -16,10 +17,10 @@ from cogmap.services.player.landmark_logs.delay import Delay
 from cogmap.services.player.landmark_logs.views import (
     LandmarkLog,
     check_landmarks,
-    true_poses,
     view_stamps,
 )
 from cogmap.services.player.landmark_logs.wheels import UNCALIBRATED, Wheels
+from cogmap.services.player.recording import poses_of
 
 RANGE_SHARE = 0.03
 """Standard deviation of a distance that is seen, as a share of it: the paper's (section 5.4)."""
@@ -88,7 +89,7 @@ def opened(folder: Path, config: Config) -> LandmarkLog:
         stamps_s=stamps_s,
         percepts=[list(each.values()) for each in seen],
         motions=_motions(Wheels(robot.odometry), observed, view_of, stamps_s),
-        true_poses=true_poses(robot.truth, stamps_s),
+        true_poses=poses_of(poses_at(robot.truth, stamps_s)),
         surveyed=surveyed,
         settings=SETTINGS,
     )

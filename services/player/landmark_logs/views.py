@@ -36,9 +36,6 @@ SAME_VIEW_S = 0.005
 differ by a rounding.
 """
 
-MAX_TRUTH_GAP_S = 0.5
-"""Between two true poses that are farther apart nobody knows where the robot was."""
-
 POST_M = 0.1
 """What a surveyed landmark is drawn as: its size is not known."""
 
@@ -121,23 +118,6 @@ def view_stamps(observed_s: Floats, begin_s: float, end_s: float) -> tuple[Float
     stamps_s = np.sort(np.concatenate([*ticks, seen_s]))
     view_of = np.searchsorted(stamps_s, observed_s, side="right") - 1
     return stamps_s, view_of
-
-
-def true_poses(truth: Floats, stamps_s: Floats) -> list[Pose | None]:
-    """Interpolate a truth of (m, 4) rows, stamp in s, x_m, y_m and heading_rad, at (n,) stamps;
-    None where it has a gap.
-    """
-    known_s, x_m, y_m, heading_rad = truth.T
-    columns = [np.interp(stamps_s, known_s, each) for each in (x_m, y_m, np.unwrap(heading_rad))]
-
-    after = np.searchsorted(known_s, stamps_s).clip(1, len(known_s) - 1)
-    is_inside = (stamps_s >= known_s[0]) & (stamps_s <= known_s[-1])
-    is_known = is_inside & (known_s[after] - known_s[after - 1] <= MAX_TRUTH_GAP_S)
-
-    poses: list[Pose | None] = []
-    for at, pose in zip(is_known.tolist(), np.column_stack(columns).tolist(), strict=True):
-        poses.append(Pose(x_m=pose[0], y_m=pose[1], heading_rad=pose[2]) if at else None)
-    return poses
 
 
 def check_landmarks(names: Collection[int], source: Path, kind: str) -> None:

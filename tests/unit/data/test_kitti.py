@@ -142,7 +142,7 @@ def _with_small_right_pictures(folder: Path) -> None:
         (lambda folder: (folder / "poses.txt").write_text(POSES[:60]), "poses.txt"),
         (lambda folder: (folder / "image_0" / "a.png").touch(), "are numbers"),
         (_without_pictures, "has no whole pair"),
-        (_with_small_right_pictures, "is 60 x 40, .* is 30 x 20: give rectified"),
+        (_with_small_right_pictures, "is 60 x 40, .* is 30 x 20: give pictures"),
     ],
 )
 def test_a_wrong_folder_is_refused_with_a_remedy(

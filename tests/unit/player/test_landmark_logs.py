@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cogmap.data.true_path import poses_at
 from cogmap.errors import ConfigError, UsageError
 from cogmap.schemas.sensing import Percepts, RangeScan, SelfMotion
 from cogmap.services.player.config import Config
@@ -14,10 +15,9 @@ from cogmap.services.player.formats import opened
 from cogmap.services.player.landmark_logs.views import (
     LandmarkLog,
     check_landmarks,
-    true_poses,
     view_stamps,
 )
-from cogmap.services.player.recording import LEAD_NS
+from cogmap.services.player.recording import LEAD_NS, poses_of
 from cogmap.testing import of_type
 from tests.support.recordings import mrclam_folder
 
@@ -45,7 +45,7 @@ def test_what_is_seen_at_the_very_beginning_belongs_to_the_first_view() -> None:
 def test_truth_is_not_invented_in_a_gap_nor_outside_of_it() -> None:
     truth = np.array([[1.0, 0.0, 0.0, 3.1], [1.2, 2.0, 0.0, -3.1], [9.0, 5.0, 5.0, 0.0]])
 
-    before, known, gap, after = true_poses(truth, np.array([0.9, 1.1, 5.0, 9.1]))
+    before, known, gap, after = poses_of(poses_at(truth, np.array([0.9, 1.1, 5.0, 9.1])))
 
     assert before is None
     assert gap is None
