@@ -95,6 +95,7 @@ class Observer:
         self.start: Pose | None = None
         self.played = Played()
         self._true_m = 0.0
+        self._start_ns = 0
         self.place_m = (0.0, 0.0)
         self.has_ended = False
         self._share_of_time = 0.0
@@ -145,6 +146,7 @@ class Observer:
         pose = true.pose
         if self.start is None:
             self.start = pose
+            self._start_ns = true.stamp_ns
 
         self.place_m = (pose.x_m, pose.y_m)
         self._true.add(true.stamp_ns, pose.x_m, pose.y_m)
@@ -232,12 +234,19 @@ class Observer:
         return self._from_start(self._frame.from_start(points_m))
 
     def _from_start(self, points_m: Floats) -> Floats:
-        """Transform points (n, 2) of the frame in which the agent began into the world's."""
+        """Transform points (n, 2) of the frame in which the agent began into the world's.
+
+        Where a recording begins before anybody knew the robot's true pose, that frame is where the
+        first one has it by path integration.
+        """
         start = self.start
         if start is None:
             return points_m
 
         pose = np.array([start.x_m, start.y_m, start.heading_rad])
+        if self.played.recording:
+            moved = self._fused.pose_at(self._start_ns)
+            pose = se2.compose(pose, se2.relative(moved, np.zeros(3)))
         return se2.transform_from(pose, points_m)
 
     @property

@@ -96,6 +96,7 @@ class PathIntegrator:
     def __init__(self) -> None:
         self.track = Track()
         self.travelled_m = 0.0
+        self._headings_rad: dict[int, float] = {}
         self._x_m = 0.0
         self._y_m = 0.0
         self._heading_rad = 0.0
@@ -103,7 +104,7 @@ class PathIntegrator:
     def start(self, stamp_ns: int) -> None:
         """Begin the path at the origin, unless it has begun."""
         if not len(self.track):
-            self.track.add(stamp_ns, self._x_m, self._y_m)
+            self.mark(stamp_ns)
 
     def reached(self, stamp_ns: int) -> bool:
         """Decide whether the path has come to this stamp already: in lockstep a message is repeated
@@ -126,3 +127,17 @@ class PathIntegrator:
     def mark(self, stamp_ns: int) -> None:
         """Append the position that the steps so far have led to."""
         self.track.add(stamp_ns, self._x_m, self._y_m)
+        self._headings_rad[stamp_ns] = self._heading_rad
+
+    def pose_at(self, stamp_ns: int) -> Floats:
+        """Interpolate the pose (3,) at a stamp; outside of the path it is that of its nearer end,
+        and the origin if there is no path.
+        """
+        if not len(self.track):
+            return np.zeros(3)
+
+        stamps_ns = self.track.stamps_ns
+        since_ns = stamps_ns - stamps_ns[0]
+        columns = [*self.track.points_m.T, np.array([*self._headings_rad.values()])]
+        wanted_ns = stamp_ns - stamps_ns[0]
+        return np.array([np.interp(wanted_ns, since_ns, each) for each in columns])

@@ -47,6 +47,14 @@ FORMATS = {
         "folder of an MRCLAM set: Robot1_Odometry.dat and the others",
         "cogmap.services.player.landmark_logs.mrclam:opened",
     ),
+    "ranges": Format(
+        "folder of a robot among beacons: odometry.csv, ranges.csv",
+        "cogmap.services.player.landmark_logs.ranges:opened",
+    ),
+    "trees": Format(
+        "folder of a car among trees: odometry.csv, trees.csv, gps.csv",
+        "cogmap.services.player.landmark_logs.trees:opened",
+    ),
 }
 
 

@@ -10,10 +10,10 @@ from cogmap.data import mrclam
 from cogmap.data.true_path import poses_at
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Floats, Indices
-from cogmap.runtime.config import Sections
 from cogmap.schemas.sensing import Percept
 from cogmap.services.player.config import Config
 from cogmap.services.player.landmark_logs.delay import Delay
+from cogmap.services.player.landmark_logs.settings import RANGE_SHARE, of_points
 from cogmap.services.player.landmark_logs.views import (
     LandmarkLog,
     check_landmarks,
@@ -22,42 +22,14 @@ from cogmap.services.player.landmark_logs.views import (
 from cogmap.services.player.landmark_logs.wheels import UNCALIBRATED, Wheels
 from cogmap.services.player.recording import poses_of
 
-RANGE_SHARE = 0.03
-"""Standard deviation of a distance that is seen, as a share of it: the paper's (section 5.4)."""
-
 BEARING_SD_RAD = float(np.deg2rad(1.0))
 """That of a bearing: a barcode covers some degrees of the picture, and is found to within one."""
 
 MIN_COSINE = 0.1
 """Of a bearing in the picture: a camera does not see so far aside."""
 
-DRIFT_RAD_PER_M = 0.05
-"""What a heading by wheels of that noise drifts by in a metre, at speeds below 1 m/s."""
-
-SETTINGS: Sections = {
-    "workspace": {"base_level_decay": 0.0},
-    "codelets": {
-        "samples": 1000,
-        "kept_samples": 100,
-        "landmark_samples": 1000,
-        "correlated_views": 1.0,
-        "landmarks": "points",
-        "landmark_jitter_m": 0.003,
-        "speed_gain_sd": UNCALIBRATED.speed,
-        "turn_gain_sd": UNCALIBRATED.turn,
-        "drift_rad_per_m": DRIFT_RAD_PER_M,
-        "range_gain_sd": RANGE_SHARE,
-        "anchor": "map",
-        "path_spacing_m": 0.3,
-        "path_variance_per_m": UNCALIBRATED.speed**2,
-        "heading_variance_per_m": DRIFT_RAD_PER_M**2,
-        "heading_variance_per_rad": UNCALIBRATED.turn**2,
-    },
-}
-"""A robot whose senses nobody has calibrated, in a hall with posts no thicker than a finger: its
-gains may err by what the noise of its senses is taken for, views of a post err independently, and
-the path has places that are as near to each other as the hall is small. What it has seen is kept.
-"""
+PATH_SPACING_M = 0.3
+"""Between places of the path: the hall is some metres wide."""
 
 
 def opened(folder: Path, config: Config) -> LandmarkLog:
@@ -91,7 +63,7 @@ def opened(folder: Path, config: Config) -> LandmarkLog:
         motions=_motions(Wheels(robot.odometry), observed, view_of, stamps_s),
         true_poses=poses_of(poses_at(robot.truth, stamps_s)),
         surveyed=surveyed,
-        settings=SETTINGS,
+        settings=of_points(UNCALIBRATED, PATH_SPACING_M),
     )
 
 

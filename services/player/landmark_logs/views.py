@@ -27,8 +27,8 @@ from cogmap.schemas.sensing import (
 from cogmap.services.player.recording import LEAD_NS
 
 TICK_S = 0.2
-"""Where nothing was seen for so long there is a view of nothing: as often as the town's robot has
-one.
+"""Where nothing was seen for so long, nor soon is, there is a view of nothing: as often as the
+town's robot has one.
 """
 
 SAME_VIEW_S = 0.005
@@ -113,7 +113,7 @@ def view_stamps(observed_s: Floats, begin_s: float, end_s: float) -> tuple[Float
 
     ticks = [np.array([begin_s])]
     for last_s, next_s in pairwise([begin_s, *seen_s.tolist(), end_s]):
-        ticks.append(np.arange(last_s + TICK_S, next_s - SAME_VIEW_S, TICK_S))
+        ticks.append(np.arange(last_s + TICK_S, next_s - TICK_S / 2, TICK_S))
 
     stamps_s = np.sort(np.concatenate([*ticks, seen_s]))
     view_of = np.searchsorted(stamps_s, observed_s, side="right") - 1

@@ -318,3 +318,17 @@ def test_what_could_not_be_played_is_kept_and_the_end_of_it_ends_the_drive() -> 
     assert observer.played.recording == "kitti:07"
     assert (observer.played.views, observer.played.skipped) == (2, 1)
     assert list(observer.played.reasons) == ["000001.png is no whole picture"]
+
+
+def test_a_truth_that_begins_late_in_a_recording_begins_where_path_integration_is_then() -> None:
+    observer = Observer()
+    observer.update(playback(0, 0.0))
+    for tick in range(1, 9):
+        observer.update(self_motion(tick, 1.0, turn_rate_rad_s=0.5))
+        observer.update(playback(tick, 0.5))
+        if tick == 4:
+            observer.update(true_pose(tick, 5.0, 0.0, math.pi / 2))
+
+    assert observer.fused_path_m[4] == pytest.approx([5.0, 0.0])
+    ahead_m = observer.fused_path_m[5] - observer.fused_path_m[4]
+    assert math.atan2(ahead_m[1], ahead_m[0]) == pytest.approx(math.pi / 2, abs=0.02)
