@@ -10,13 +10,15 @@ import numpy as np
 from cogmap.data.mrclam import Robot
 from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import Percept
-from cogmap.services.player.public import Delay, Wheels
+from cogmap.services.player.public import Delay, WheelNoise, Wheels
+from cogmap.services.sensory.public import SensoryConfig
 
 TICK_S = 0.2
 STAMP_DECIMALS = 6
 RANGE_NOISE = 0.03
 BEARING_SD_RAD = float(np.deg2rad(1.0))
 MIN_COSINE = 0.1
+NOISE = SensoryConfig()
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,8 @@ def moments(robot: Robot, skipped_s: tuple[float, float] | None = None) -> Itera
     firsts = np.searchsorted(observed[:, 0], stamps, "left")
     ends = np.searchsorted(observed[:, 0], stamps, "right")
 
-    wheels = Wheels(robot.odometry)
+    noise = WheelNoise(NOISE.speed_noise, NOISE.turn_noise, NOISE.drift_rad_per_sqrt_m)
+    wheels = Wheels(robot.odometry, noise)
     delay = Delay()
     moved_until_s = begin_s
 

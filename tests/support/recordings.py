@@ -71,7 +71,7 @@ def mrclam_folder(folder: Path, barcodes: Sequence[int] = (63, 25)) -> Path:
     """
     folder.mkdir(exist_ok=True)
     odometry = "".join(f"{100 + tick / 10:.3f} 0.5 0.0\n" for tick in range(21))
-    seen = [f"{at_s} {code} 2.0 0.2\n" for at_s in (100.5, 101.0, 101.5) for code in barcodes]
+    seen = [f"{at_s} {code} 2.0 0.2\n" for at_s in (100.46, 100.92, 101.38) for code in barcodes]
     truth = "".join(f"{100 + tick / 10:.3f} {tick / 20} 0.0 0.0\n" for tick in range(21))
     files = {
         "Barcodes": "1 5\n6 63\n7 25\n",

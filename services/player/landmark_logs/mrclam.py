@@ -14,12 +14,13 @@ from cogmap.schemas.sensing import Percept
 from cogmap.services.player.config import Config
 from cogmap.services.player.landmark_logs.delay import Delay
 from cogmap.services.player.landmark_logs.settings import RANGE_SHARE, of_points
+from cogmap.services.player.landmark_logs.sightings import sighting
 from cogmap.services.player.landmark_logs.views import (
     LandmarkLog,
     check_landmarks,
     view_stamps,
 )
-from cogmap.services.player.landmark_logs.wheels import UNCALIBRATED, Wheels
+from cogmap.services.player.landmark_logs.wheels import Wheels
 from cogmap.services.player.recording import poses_of
 
 BEARING_SD_RAD = float(np.deg2rad(1.0))
@@ -63,7 +64,7 @@ def opened(folder: Path, config: Config) -> LandmarkLog:
         motions=_motions(Wheels(robot.odometry), observed, view_of, stamps_s),
         true_poses=poses_of(poses_at(robot.truth, stamps_s)),
         surveyed=surveyed,
-        settings=of_points(UNCALIBRATED, PATH_SPACING_M),
+        settings=of_points(path_spacing_m=PATH_SPACING_M),
     )
 
 
@@ -80,18 +81,12 @@ def _percept(row: Floats) -> Percept:
     """
     _, subject, depth_m, bearing_rad = row.tolist()
     range_m = depth_m / max(float(np.cos(bearing_rad)), MIN_COSINE)
-    return Percept(
-        label=label_of(int(subject)),
-        activation=1.0,
-        evidence=1.0,
-        bearing_rad=bearing_rad,
-        range_m=range_m,
+    return sighting(
+        label_of(int(subject)),
+        bearing_rad,
+        range_m,
         bearing_sd_rad=BEARING_SD_RAD,
         range_sd_m=RANGE_SHARE * range_m,
-        width_m=0.0,
-        height_m=0.0,
-        whole=True,
-        box_px=(0, 0, 0, 0),
     )
 
 

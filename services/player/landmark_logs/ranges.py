@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +14,27 @@ from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import Percept
 from cogmap.services.player.config import Config
 from cogmap.services.player.landmark_logs.settings import of_points
+from cogmap.services.player.landmark_logs.sightings import sighting
 from cogmap.services.player.landmark_logs.views import LandmarkLog, check_landmarks, view_stamps
-from cogmap.services.player.landmark_logs.wheels import UNCALIBRATED, Wheels
+from cogmap.services.player.landmark_logs.wheels import Wheels
 from cogmap.services.player.recording import poses_of
 
 RANGE_SD_M = 1.0
-"""Standard deviation of a range by radio, as its makers have it for one in the open."""
+"""Standard deviation of a range by radio, once its gain is known."""
+
+GYROSCOPE: dict[str, Any] = {
+    "samples": 500,
+    "landmark_samples": 300,
+    "range_gain_sd": 0.1,
+    "speed_gain_sd": 0.02,
+    "turn_gain_sd": 0.01,
+    "drift_rad_per_m": 0.001,
+    "closure_spacing_s": 10.0,
+    "landmark_jitter_m": 0.03,
+}
+"""A robot that measures its turns by a gyroscope, and drives tens of metres among radios that
+nobody calibrated.
+"""
 
 NO_BEARING_RAD = 7.0
 """Standard deviation of a bearing that nobody knows: the most that a percept may have."""
@@ -48,7 +64,7 @@ def opened(folder: Path, config: Config) -> LandmarkLog:
         motions=motions,
         true_poses=poses_of(poses_at(recorded.truth, stamps_s)),
         surveyed={label_of(number): where for number, where in recorded.beacons.items()},
-        settings=of_points(UNCALIBRATED, spacing_m=1.0),
+        settings=of_points(**GYROSCOPE),
     )
 
 
@@ -69,16 +85,10 @@ def speeds(odometry: Floats) -> Floats:
 
 def _percept(number: int, range_m: float) -> Percept:
     """Make a percept of a beacon at a range, in whatever direction."""
-    return Percept(
-        label=label_of(number),
-        activation=1.0,
-        evidence=1.0,
-        bearing_rad=0.0,
-        range_m=range_m,
+    return sighting(
+        label_of(number),
+        0.0,
+        range_m,
         bearing_sd_rad=NO_BEARING_RAD,
         range_sd_m=RANGE_SD_M,
-        width_m=0.0,
-        height_m=0.0,
-        whole=True,
-        box_px=(0, 0, 0, 0),
     )

@@ -14,17 +14,18 @@ from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import Percept
 from cogmap.services.player.config import Config
 from cogmap.services.player.landmark_logs.settings import of_points
+from cogmap.services.player.landmark_logs.sightings import sighting
 from cogmap.services.player.landmark_logs.views import LandmarkLog, view_stamps
-from cogmap.services.player.landmark_logs.wheels import UNCALIBRATED, Wheels
+from cogmap.services.player.landmark_logs.wheels import Wheels
 from cogmap.services.player.recording import poses_of
 
 LABEL = "tree"
 """What every trunk is: nothing says which tree it is."""
 
 RANGE_SD_M = 0.3
-BEARING_SD_RAD = float(np.deg2rad(2.0))
-"""Standard deviations of a trunk's range and bearing: a scan is right to some 0.1 s, in which the
-car drives 0.3 m and turns by a degree or two.
+BEARING_SD_RAD = float(np.deg2rad(1.0))
+"""Standard deviations of a trunk's range and bearing: the stamps of scans are right to some 0.1 s,
+in which the car drives 0.3 m and turns by a degree.
 """
 
 COURSE_S = 1.0
@@ -60,7 +61,7 @@ def opened(folder: Path, config: Config) -> LandmarkLog:
         motions=motions,
         true_poses=poses_of(poses_at(courses(recorded.gps), stamps_s)),
         surveyed={},
-        settings=of_points(UNCALIBRATED, spacing_m=1.0),
+        settings=of_points(),
     )
 
 
@@ -83,16 +84,11 @@ def courses(gps: Floats) -> Floats:
 def _percept(row: Floats) -> Percept:
     """Make a percept of a trunk (stamp, range, bearing, diameter), seen from the rear axle."""
     _, range_m, bearing_rad, diameter_m = row.tolist()
-    return Percept(
-        label=LABEL,
-        activation=1.0,
-        evidence=1.0,
-        bearing_rad=bearing_rad,
-        range_m=range_m,
+    return sighting(
+        LABEL,
+        bearing_rad,
+        range_m,
         bearing_sd_rad=BEARING_SD_RAD,
         range_sd_m=RANGE_SD_M,
         width_m=diameter_m,
-        height_m=0.0,
-        whole=True,
-        box_px=(0, 0, 0, 0),
     )
