@@ -29,7 +29,7 @@ VERBS = {
     "module": ("cogmap.cli.processes:module", "Run one module as this process."),
     "new": ("cogmap.cli.new.command:new", "Write a new codelet or module to begin with."),
     "router": ("cogmap.cli.processes:router", "Run the router that all modules connect to."),
-    "run": ("cogmap.cli.run.command:run", "Drive the robot through a simulated town."),
+    "run": ("cogmap.cli.run.command:run", "Drive through a simulated town, or play a recording."),
     "schemes": ("cogmap.cli.schemes:schemes", "Write the guidance schemes learned on a drive."),
     "street": ("cogmap.cli.street:street", "Close and open streets of the simulated town."),
     "topic": ("cogmap.cli.topic.command:topic", "Watch topics of a running system; publish."),

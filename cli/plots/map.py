@@ -21,6 +21,8 @@ from cogmap.cli.plots.town_layer import CHARGING_MARKER, draw_town
 from cogmap.graph.graph import Graph
 
 MARGIN_M = 5.0
+ROADSIDE_M = 20.0
+"""The margin where no town is known: what was learned stands beside the path."""
 SCALE_M = 10.0
 DASHED = (0, (4, 2))
 DOTTED = (0, (1, 1.2))
@@ -85,7 +87,8 @@ def _dress(
         ]
     )
     if len(every):
-        (west, south), (east, north) = every.min(axis=0) - MARGIN_M, every.max(axis=0) + MARGIN_M
+        margin_m = MARGIN_M if town is not None else ROADSIDE_M
+        (west, south), (east, north) = every.min(axis=0) - margin_m, every.max(axis=0) + margin_m
         axes.set_xlim(west, east)
         axes.set_ylim(south, north)
         axes.plot(
@@ -129,7 +132,7 @@ def _dress(
         linespacing=1.5,
     )
     axes.legend(
-        handles=[*_legend(), *_charging_legend(metrics), *structure],
+        handles=[*_legend(observer), *_charging_legend(metrics), *structure],
         loc="upper center",
         bbox_to_anchor=(0.5, -0.06),
         ncols=4,
@@ -145,10 +148,15 @@ def _charging_legend(metrics: RecordedMetrics) -> list[Line2D]:
     return [Line2D([], [], label="charging place", **CHARGING_MARKER)]
 
 
-def _legend() -> list[Patch | Line2D]:
+def _legend(observer: Observer) -> list[Patch | Line2D]:
+    """Return the legend of what is drawn of every drive, and of the town if it is known."""
+    of_town: list[Patch | Line2D] = []
+    if observer.town is not None:
+        of_town.append(Patch(fc=palette.STREET, ec=palette.KERB, label="street"))
+        of_town.append(Patch(fc=palette.HOUSE, ec=palette.WALL, label="building"))
+
     return [
-        Patch(fc=palette.STREET, ec=palette.KERB, label="street"),
-        Patch(fc=palette.HOUSE, ec=palette.WALL, label="building"),
+        *of_town,
         Line2D([], [], color=TRUE, lw=3.2, label="true path"),
         Line2D([], [], color=ESTIMATE, lw=1.5, label="estimated path"),
         Line2D([], [], color=FUSED, lw=1.4, ls=DOTTED, label="fused self-motion alone"),
