@@ -101,6 +101,8 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
     ratios = f"{metrics.error_over_fused:.3f} over fused self-motion"
     if metrics.wheels_alone.is_measured:
         ratios = f"{ratios}, {metrics.error_ratio:.3f} over wheels"
+    if not metrics.estimate.is_measured:
+        ratios = "not measured"
     learned = (
         f"{metrics.objects} buildings, half of those that it knew by name within "
         f"{metrics.object_error_median_m:.2f} m; {metrics.road_m2:.0f} m² of street"

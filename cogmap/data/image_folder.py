@@ -74,10 +74,11 @@ def read_images(folder: Path) -> StereoRecording:
     left = _pictures(folder / "left")
     right = _pictures(folder / "right")
     names = sorted(left.keys() | right.keys(), key=_in_order)
-    paths = [
-        (left.get(name, folder / "left" / name), right.get(name, folder / "right" / name))
-        for name in names
-    ]
+    paths = []
+    for name in names:
+        file_name = (left.get(name) or right[name]).name
+        missing = (folder / "left" / file_name, folder / "right" / file_name)
+        paths.append((left.get(name, missing[0]), right.get(name, missing[1])))
     width_px, height_px = pair_size_px(paths, folder, GIVE)
     described = msgspec.structs.asdict(camera)
     del described["rate_hz"]

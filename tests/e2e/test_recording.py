@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cogmap.recording.diff import diff
 from tests.support.recordings import mrclam_folder
-from tests.support.system.runs import COGMAP, Run, processes_at
+from tests.support.system.runs import COGMAP, DRIVING, Run, processes_at
 
 REPLAYED = ("player", "workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 
@@ -57,6 +57,22 @@ def test_the_log_of_a_recording_is_a_recording_with_the_same_outcome(
     compared = diff(first.folder / "log.mcap", again.folder / "log.mcap")
     same = {topic.topic: topic.same for topic in compared.topics if topic.same}
     assert {"epam/percepts", "workspace/delta", "motor/command"} <= same.keys()
+
+
+def test_a_player_that_is_killed_goes_on_where_it_was(
+    start: Callable[..., Run], tmp_path: Path
+) -> None:
+    folder = mrclam_folder(tmp_path / "walk", times=60)
+    run = start("--recording", f"mrclam:{folder}", "--lockstep")
+    run.wait_for(DRIVING)
+
+    run.kill("player")
+
+    assert run.end() == 0, run.output()
+    summary = run.summary()
+    assert summary["restarts"] == {"player": 1}
+    assert summary["views"] == 123
+    assert 120 <= summary["commands"] <= 123
 
 
 def test_in_real_time_a_recording_that_ends_ends_the_run(

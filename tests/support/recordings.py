@@ -65,14 +65,16 @@ def kitti_folder(folder: Path, pairs: int = 3) -> Path:
     return folder
 
 
-def mrclam_folder(folder: Path, barcodes: Sequence[int] = (63, 25)) -> Path:
-    """Make an MRCLAM set of one robot, which drives at 0.5 m/s for 2 s and sees `barcodes` thrice,
-    2 m ahead and 0.2 rad to the left.
+def mrclam_folder(folder: Path, barcodes: Sequence[int] = (63, 25), times: int = 3) -> Path:
+    """Make an MRCLAM set of one robot, which drives at 0.5 m/s, and sees `barcodes` 2 m ahead and
+    0.2 rad to the left, so many times, every 0.46 s; it has 3 views, and 2 for each time.
     """
     folder.mkdir(exist_ok=True)
-    odometry = "".join(f"{100 + tick / 10:.3f} 0.5 0.0\n" for tick in range(21))
-    seen = [f"{at_s} {code} 2.0 0.2\n" for at_s in (100.46, 100.92, 101.38) for code in barcodes]
-    truth = "".join(f"{100 + tick / 10:.3f} {tick / 20} 0.0 0.0\n" for tick in range(21))
+    ticks = range(round(4.6 * times + 6.2) + 1)
+    odometry = "".join(f"{100 + tick / 10:.3f} 0.5 0.0\n" for tick in ticks)
+    truth = "".join(f"{100 + tick / 10:.3f} {tick / 20} 0.0 0.0\n" for tick in ticks)
+    stamps_s = [100 + 0.46 * (number + 1) for number in range(times)]
+    seen = [f"{at_s:.3f} {code} 2.0 0.2\n" for at_s in stamps_s for code in barcodes]
     files = {
         "Barcodes": "1 5\n6 63\n7 25\n",
         "Landmark_Groundtruth": "6 2.0 0.4 0.0 0.0\n7 3.0 0.6 0.0 0.0\n",
