@@ -5,14 +5,10 @@ from __future__ import annotations
 from functools import cached_property
 from pathlib import Path
 
-import cv2
-import numpy as np
-
 from cogmap.data.euroc import read_euroc
 from cogmap.data.image_folder import read_images
 from cogmap.data.kitti import read_kitti
 from cogmap.data.stereo_recording import StereoRecording
-from cogmap.geometry.arrays import Bytes
 from cogmap.runtime.config import Sections
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
@@ -20,12 +16,15 @@ from cogmap.schemas.sensing import Pose, StereoFrame, TrueTown
 from cogmap.services.player.config import Config
 from cogmap.services.player.recording import LEAD_NS, poses_of
 
+BY_VIEWS: Sections = {"sensory": {"self_motion": "views"}}
+"""Nobody measured how wheels turned."""
+
 
 class StereoFrames:
     """The frames of a camera without wheels."""
 
     def __init__(self, recorded: StereoRecording) -> None:
-        self.settings: Sections = {}
+        self.settings = BY_VIEWS
         self._recorded = recorded
 
     @cached_property
@@ -54,8 +53,8 @@ class StereoFrames:
         frame = StereoFrame(
             stamp_ns=self.stamps_ns[number],
             frame=number,
-            left=Array.of(_in_colour(left)),
-            right=Array.of(_in_colour(right)),
+            left=Array.of(left),
+            right=Array.of(right),
             calibration=self._recorded.calibration,
         )
         return [frame]
@@ -78,10 +77,3 @@ def images(folder: Path, config: Config) -> StereoFrames:
 def kitti(folder: Path, config: Config) -> StereoFrames:
     """Open a KITTI sequence. Raises UsageError."""
     return StereoFrames(read_kitti(folder))
-
-
-def _in_colour(image: Bytes) -> Bytes:
-    """Return a picture as RGB, (h, w, 3)."""
-    if image.ndim == 3:
-        return image
-    return np.asarray(cv2.cvtColor(image, cv2.COLOR_GRAY2RGB), np.uint8)

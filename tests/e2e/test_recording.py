@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from cogmap.recording.diff import diff
-from tests.support.recordings import mrclam_folder
+from tests.support.recordings import kitti_folder, mrclam_folder
 from tests.support.system.runs import COGMAP, DRIVING, Run, processes_at
 
 REPLAYED = ("player", "workspace", "codelets", "global_workspace", "procedural", "action", "motor")
@@ -95,3 +95,23 @@ def test_a_recording_that_cannot_be_played_is_one_sentence_and_code_2(
     assert run.output().startswith(f"cogmap: {tmp_path} has no folders image_0 and image_1")
     assert len(run.output().splitlines()) == 1
     assert not run.folder.exists()
+
+
+def test_pictures_are_seen_and_a_broken_one_in_the_middle_is_left_out_counted_and_said(
+    start: Callable[..., Run], tmp_path: Path
+) -> None:
+    folder = kitti_folder(tmp_path / "07", pairs=5)
+    (folder / "image_1" / "000002.png").write_bytes(b"no picture")
+    run = start("--recording", f"kitti:{folder}", "--lockstep")
+    assert run.end() == 0, run.output()
+
+    summary = run.summary()
+    assert summary["ended_by"] == "recording over"
+    assert (summary["views"], summary["skipped"]) == (4, 1)
+    (reason,) = summary["skipped_reasons"]
+    assert "000002.png is no whole picture" in reason
+    assert "1 were left out" in summary["reason"]
+    assert summary["commands"] == 4
+    assert summary["distance_m"] < 0.5, "the camera stands"
+    assert summary["estimate"]["max_m"] == 0.0, "nobody knows where it really was"
+    assert (run.folder / "map.png").read_bytes().startswith(b"\x89PNG")

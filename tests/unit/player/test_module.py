@@ -55,7 +55,7 @@ def test_lockstep_plays_a_view_for_each_answer_and_then_says_that_it_is_over(
         LEAD_NS + 100_000_000,
         LEAD_NS + 200_000_000,
     ]
-    assert frames[0].left.shape[:2] == (48, 64)
+    assert frames[0].left.shape == (48, 64)
     assert {clock.rate for clock in of_type(Clock, messages)} == {0.0}
     played = of_type(Playback, messages)
     assert [each.views for each in played] == [1, 2, 3, 3]
