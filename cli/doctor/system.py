@@ -13,6 +13,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock, Health
 from cogmap.schemas.topics import Scope
+from cogmap.services import registry
 
 RATE_TOLERANCE = 0.3
 MIN_MEASURED_HZ = 1.0
@@ -40,14 +41,18 @@ class Observed:
 
 
 def examine(expected: Iterable[str], observed: Observed, system: System) -> list[Finding]:
-    """Collect all findings about a system that should have the modules `expected`."""
+    """Collect all findings about a system that should have the modules `expected`. The rates of a
+    recording are its own.
+    """
+    modules = list(expected)
+    rates = [] if registry.PLAYER in modules else wrong_rates(observed, system)
     return [
-        *absent(expected, observed),
-        *silent(expected, observed),
+        *absent(modules, observed),
+        *silent(modules, observed),
         *not_ready(observed),
         *complaints(observed),
-        *wrong_rates(observed, system),
-        *truth_leaks(expected, system),
+        *rates,
+        *truth_leaks(modules, system),
     ]
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections import deque
 
+from msgspec.structs import replace
+
 from cogmap.schemas.base import Message
-from cogmap.schemas.process import Clock
+from cogmap.schemas.process import Clock, Playback
 from cogmap.schemas.sensing import MotorCommand
 from cogmap.services.player.playhead import Playhead
 
@@ -13,8 +15,9 @@ from cogmap.services.player.playhead import Playhead
 PERIOD_NS = 25_000_000
 # At most so much of the wall's time is caught up at once.
 CATCH_UP_NS = 250_000_000
-# How often what stood there is published, for those who join later.
-TOWN_PERIOD_NS = 5_000_000_000
+# How often what stood there is published, for those who join later, and how much has been played,
+# by which observers know in a long gap between two views that time passes.
+TOLD_PERIOD_NS = 5_000_000_000
 
 LAST_ANSWER_NS = 3_000_000_000
 """Wall time that the last view has for its command: some cycles of a loaded machine."""
@@ -37,7 +40,8 @@ class RealTime:
         self._view_ns = -1
         self._answered_ns = -1
         self._waits_ns = 0
-        self._town_ns: int | None = None
+        self._told_ns: int | None = None
+        self._played: Playback | None = None
 
     def on_start(self) -> None:
         """Let time begin with the next timer."""
@@ -63,7 +67,7 @@ class RealTime:
         self._now_ns += round(passed_ns * self._speed)
 
         messages: list[Message] = [Clock(stamp_ns=self._now_ns, rate=self._speed)]
-        messages += self._town(wall_ns)
+        messages += self._told(wall_ns)
         messages += self._released()
         if self._due:
             return messages
@@ -73,13 +77,16 @@ class RealTime:
             messages.append(self._playhead.end())
         return messages
 
-    def _town(self, wall_ns: int) -> list[Message]:
-        """Return what really stood there, if that is known, and it is time."""
-        if self._town_ns is not None and wall_ns - self._town_ns < TOWN_PERIOD_NS:
+    def _told(self, wall_ns: int) -> list[Message]:
+        """Return what observers are told from time to time, if it is time."""
+        if self._told_ns is not None and wall_ns - self._told_ns < TOLD_PERIOD_NS:
             return []
 
-        self._town_ns = wall_ns
-        return self._playhead.town()
+        self._told_ns = wall_ns
+        told = self._playhead.town()
+        if self._played is not None:
+            told.append(replace(self._played, stamp_ns=self._now_ns, reasons=[]))
+        return told
 
     def _released(self) -> list[Message]:
         """Take what is due now; if nothing comes later, nothing is left."""
@@ -87,7 +94,10 @@ class RealTime:
         while self._due or self._has_read_more():
             if self._due[0].stamp_ns > self._now_ns:
                 break
-            released.append(self._due.popleft())
+            message = self._due.popleft()
+            if isinstance(message, Playback):
+                self._played = message
+            released.append(message)
         return released
 
     def _has_read_more(self) -> bool:

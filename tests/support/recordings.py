@@ -22,17 +22,20 @@ SIZE_PX = (48, 64)
 @dataclass
 class Walk:
     """Views of percepts, the wheels before each, and true poses 1 m apart. Those views whose number
-    is `broken` cannot be read; nobody knows the true poses at those `unknown`.
+    is `broken` cannot be read; nobody knows the true poses at those `unknown`. The last one comes
+    `gap_s` late.
     """
 
     views: int
     broken: Collection[int] = ()
     unknown: Collection[int] = ()
     settings: Sections = field(default_factory=dict)
+    gap_s: float = 0.0
 
     @property
     def stamps_ns(self) -> list[int]:
-        return [stamp_ns(number) for number in range(self.views)]
+        *others, last_ns = [stamp_ns(number) for number in range(self.views)]
+        return [*others, last_ns + round(self.gap_s * 1e9)]
 
     @property
     def true_poses(self) -> list[Pose | None]:
@@ -40,12 +43,12 @@ class Walk:
         return [None if number in self.unknown else pose for number, pose in enumerate(poses)]
 
     def before(self, number: int) -> list[Message]:
-        return [odometry(stamp_ns=stamp_ns(number) - PERIOD_NS // 2)]
+        return [odometry(stamp_ns=self.stamps_ns[number] - PERIOD_NS // 2)]
 
     def view(self, number: int) -> list[Message]:
         if number in self.broken:
             raise UsageError(f"view {number} is broken: copy it again")
-        return [percepts(number)]
+        return [percepts(number, stamp_ns=self.stamps_ns[number])]
 
     def town(self) -> TrueTown | None:
         return TrueTown(seed=0, streets=[], buildings=[])

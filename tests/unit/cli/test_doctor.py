@@ -200,3 +200,13 @@ def test_a_place_for_runs_that_cannot_be_written_to_is_named(tmp_path: Path) -> 
 
     (finding,) = installation.write_access(tmp_path / "file" / "runs")
     assert "is a file" in finding.wrong
+
+
+def test_a_recording_has_rates_of_its_own() -> None:
+    fast = {"emitted": {"sensory/scan": 300}}
+    played = observed(health(10), health(12, **fast))
+    played.ready.add(Member("player", "player"))
+    played.health["player"] = [health(10, module="player", instance="player")]
+
+    assert any("the table has" in finding for finding in findings(played))
+    assert examine(["player", "sensory"], played, system()) == []

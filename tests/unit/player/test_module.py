@@ -174,6 +174,18 @@ def test_what_stood_there_is_published_again_for_those_who_join_later() -> None:
     assert len(of_type(TrueTown, _in_real_time(real_time, 6.0))) == 2
 
 
+def test_in_a_long_gap_between_views_observers_know_that_time_passes() -> None:
+    recording = Walk(2, gap_s=20.0)
+    real_time = RealTime(Playhead(recording, "test:walk"), 1.0)
+    real_time.on_start()
+
+    played = of_type(Playback, _in_real_time(real_time, 15.0))
+
+    assert [each.views for each in played] == [1, 1, 1]
+    passed_s = [(each.stamp_ns - played[0].stamp_ns) / 1e9 for each in played]
+    assert passed_s == pytest.approx([0.0, 5.0, 10.0], abs=0.1)
+
+
 def test_in_a_simulated_run_the_player_does_nothing() -> None:
     module = build(Config(), run=Run(participants={"sim": 1}))
 
