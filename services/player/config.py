@@ -19,7 +19,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     ] = ""
     robot: Annotated[
         int,
-        msgspec.Meta(ge=1, description="Number of the robot, where a recording has several."),
+        msgspec.Meta(
+            ge=1, le=1000, description="Number of the robot, where a recording has several."
+        ),
     ] = 1
     speed: Annotated[
         float,
