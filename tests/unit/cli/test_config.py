@@ -136,7 +136,7 @@ def test_every_setting_has_a_description() -> None:
     undescribed = [
         f"{kind}.{key}"
         for kind, definition in definitions.items()
-        for key, schema in definition["properties"].items()
+        for key, schema in definition.get("properties", {}).items()
         if not schema.get("description")
     ]
 
@@ -147,7 +147,7 @@ def test_every_number_among_the_settings_is_bounded() -> None:
     definitions = file_schema()["$defs"]
     unbounded = []
     for kind, definition in definitions.items():
-        for key, schema in definition["properties"].items():
+        for key, schema in definition.get("properties", {}).items():
             if schema.get("type") in ("integer", "number"):
                 has_least = {"minimum", "exclusiveMinimum"} & schema.keys()
                 has_greatest = {"maximum", "exclusiveMaximum"} & schema.keys()
