@@ -16,7 +16,7 @@ class Playback(Message, kw_only=True, frozen=True):
     Observers only.
 
     `views` were published, and `skipped` could not be read: `reasons` has a sentence for each of
-    these since the message before.
+    these since the message before, and in the beginning for what else is not played.
     """
 
     recording: Name

@@ -248,7 +248,7 @@ def _played(observer: Observer) -> str:
     views = f"all of {played.recording} was played, {played.views} views"
     if not played.skipped:
         return views
-    return f"{views}; {played.skipped} were left out, the last one as {played.reasons[-1]}"
+    return f"{views}, {played.skipped} left out, the last one as {played.reasons[-1]}"
 
 
 def _out_of_time(tally: Tally, missing: list[str]) -> Ending:

@@ -68,7 +68,7 @@ def _ratio(errors_m: Floats, baseline_m: Floats) -> float:
 
 class Played:
     """How much of a recording has been played: `recording` names it, and is empty where the drive
-    is simulated. `reasons` say why the last of `skipped` views were left out.
+    is simulated. `reasons` say why the last of `skipped` views were left out, and what else was.
     """
 
     def __init__(self) -> None:

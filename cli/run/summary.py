@@ -132,10 +132,9 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
 def _played(metrics: DriveMetrics) -> str:
     """Write what was played, and what of it was left out."""
     played = f"{metrics.recording}, {metrics.views} views; commands moved nothing in it"
-    if not metrics.skipped:
-        return played
-    reasons = [escape(reason) for reason in metrics.skipped_reasons]
-    return "\n".join([f"{played}; {metrics.skipped} left out:", *reasons])
+    if metrics.skipped:
+        played = f"{played}; {metrics.skipped} left out"
+    return "\n".join([played, *map(escape, metrics.skipped_reasons)])
 
 
 def _first(words: Sequence[str], separator: str) -> str:

@@ -59,6 +59,7 @@ class OwnLog:
         self._truth = [each for each in sensed if each.record.topic in TRUTH]
         self.true_poses = self._true_poses()
         self.settings = _settings(self._reader)
+        self.notes: list[str] = []
 
     def before(self, number: int) -> list[Message]:
         """Return what was sensed after the view before, until this one. Raises LogError if it is

@@ -38,13 +38,14 @@ class Playhead:
         self._travelled_m = _travelled_m(recording)
         self._views = 0
         self._skipped = 0
-        self._reasons: list[str] = []
+        self._reasons: list[str] = [*recording.notes]
         self.is_over = False
 
     def resume(self, past: Iterable[Message]) -> None:
         """Continue after the last view that was published; what was over stays over."""
         for message in past:
             if isinstance(message, Playback):
+                self._reasons = []
                 self._views = message.views
                 self._skipped = message.skipped
                 self.is_over = message.progress >= 1.0

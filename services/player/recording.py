@@ -20,10 +20,11 @@ class Recording(Protocol):
     """Views in order of time, and what was sensed between them, stamped in ns since the run began.
 
     `settings` are those that such a recording asks of the modules, where the user sets none: which
-    senses the robot has, and what they err by.
+    senses the robot has, and what they err by. `notes` are sentences on what of it is not played.
     """
 
     settings: Sections
+    notes: Sequence[str]
 
     @property
     def stamps_ns(self) -> Sequence[int]:

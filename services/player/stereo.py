@@ -25,6 +25,7 @@ class StereoFrames:
 
     def __init__(self, recorded: StereoRecording) -> None:
         self.settings = BY_VIEWS
+        self.notes: list[str] = []
         self._recorded = recorded
 
     @cached_property

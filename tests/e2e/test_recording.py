@@ -110,7 +110,7 @@ def test_pictures_are_seen_and_a_broken_one_in_the_middle_is_left_out_counted_an
     assert (summary["views"], summary["skipped"]) == (4, 1)
     (reason,) = summary["skipped_reasons"]
     assert "000002.png is no whole picture" in reason
-    assert "1 were left out" in summary["reason"]
+    assert "1 left out" in summary["reason"]
     assert summary["commands"] == 4
     assert summary["distance_m"] < 0.5, "the camera stands"
     assert summary["estimate"]["max_m"] == 0.0, "nobody knows where it really was"

@@ -31,6 +31,7 @@ class Walk:
     unknown: Collection[int] = ()
     settings: Sections = field(default_factory=dict)
     gap_s: float = 0.0
+    notes: Sequence[str] = ()
 
     @property
     def stamps_ns(self) -> list[int]:

@@ -65,7 +65,19 @@ def opened(folder: Path, config: Config) -> LandmarkLog:
         true_poses=poses_of(poses_at(robot.truth, stamps_s)),
         surveyed=surveyed,
         settings=of_points(path_spacing_m=PATH_SPACING_M),
+        notes=_notes(robot),
     )
+
+
+def _notes(robot: mrclam.Robot) -> list[str]:
+    """Say what of a robot's observations is not played, if anything is not."""
+    of_robots = len(robot.observations) - len(robot.landmark_observations)
+    notes = []
+    if robot.unread:
+        notes.append(f"{robot.unread} observations of barcodes that nothing has are left out")
+    if of_robots:
+        notes.append(f"{of_robots} observations of other robots are left out")
+    return notes
 
 
 def label_of(subject: int) -> str:

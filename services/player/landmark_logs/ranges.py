@@ -15,7 +15,12 @@ from cogmap.schemas.sensing import Percept
 from cogmap.services.player.config import Config
 from cogmap.services.player.landmark_logs.settings import of_points
 from cogmap.services.player.landmark_logs.sightings import sighting
-from cogmap.services.player.landmark_logs.views import LandmarkLog, check_landmarks, view_stamps
+from cogmap.services.player.landmark_logs.views import (
+    LandmarkLog,
+    check_landmarks,
+    notes_of_order,
+    view_stamps,
+)
 from cogmap.services.player.landmark_logs.wheels import Wheels
 from cogmap.services.player.recording import poses_of
 
@@ -65,6 +70,7 @@ def opened(folder: Path, config: Config) -> LandmarkLog:
         true_poses=poses_of(poses_at(recorded.truth, stamps_s)),
         surveyed={label_of(number): where for number, where in recorded.beacons.items()},
         settings=of_points(**GYROSCOPE),
+        notes=notes_of_order(recorded.out_of_order),
     )
 
 

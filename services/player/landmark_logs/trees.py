@@ -15,7 +15,7 @@ from cogmap.schemas.sensing import Percept
 from cogmap.services.player.config import Config
 from cogmap.services.player.landmark_logs.settings import of_points
 from cogmap.services.player.landmark_logs.sightings import sighting
-from cogmap.services.player.landmark_logs.views import LandmarkLog, view_stamps
+from cogmap.services.player.landmark_logs.views import LandmarkLog, notes_of_order, view_stamps
 from cogmap.services.player.landmark_logs.wheels import Wheels
 from cogmap.services.player.recording import poses_of
 
@@ -62,6 +62,7 @@ def opened(folder: Path, config: Config) -> LandmarkLog:
         true_poses=poses_of(poses_at(courses(recorded.gps), stamps_s)),
         surveyed={},
         settings=of_points(),
+        notes=notes_of_order(recorded.out_of_order),
     )
 
 

@@ -52,6 +52,7 @@ class LandmarkLog:
     true_poses: Sequence[Pose | None]
     surveyed: dict[str, tuple[float, float]]
     settings: Sections
+    notes: Sequence[str] = ()
 
     @cached_property
     def stamps_ns(self) -> list[int]:
@@ -128,3 +129,8 @@ def check_landmarks(names: Collection[int], source: Path, kind: str) -> None:
             f"{source}: {seen}, by which no robot finds where it is: give a log with several, each "
             "with a number of its own"
         )
+
+
+def notes_of_order(late: int) -> list[str]:
+    """Say how many observations came with a stamp before that of an earlier one, if any did."""
+    return [f"{late} observations came late, and were put in order"] if late else []

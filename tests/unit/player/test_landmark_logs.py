@@ -73,6 +73,18 @@ def test_an_mrclam_robot_sees_its_landmarks_by_name_and_moves_as_it_was_commande
     assert all(scan.range_m.shape == (0,) for scan in of_type(RangeScan, messages))
 
 
+def test_barcodes_that_nothing_has_are_left_out_and_counted(tmp_path: Path) -> None:
+    assert _mrclam(mrclam_folder(tmp_path)).notes == []
+
+    log = _mrclam(mrclam_folder(tmp_path, barcodes=[63, 25, 99, 5]))
+
+    assert sum(len(percepts) for percepts in log.percepts) == 6
+    assert log.notes == [
+        "3 observations of barcodes that nothing has are left out",
+        "3 observations of other robots are left out",
+    ]
+
+
 def test_self_motion_leads_from_view_to_view(tmp_path: Path) -> None:
     log = _mrclam(mrclam_folder(tmp_path))
 
@@ -182,6 +194,13 @@ def test_ranges_are_percepts_whose_bearing_nobody_knows(tmp_path: Path) -> None:
     rows = np.vstack(log.motions)
     assert rows[1:, 0] == pytest.approx(1.0), "0.1 m in 0.1 s"
     assert rows[1:, 1] == pytest.approx(0.2)
+
+
+def test_observations_that_came_late_are_put_in_order_and_counted(tmp_path: Path) -> None:
+    log = _trees(tmp_path, "3.0,10.0,0.0,0.4\n2.0,5.0,0.5,0.9\n")
+
+    assert log.notes == ["1 observations came late, and were put in order"]
+    assert [len(percepts) for percepts in log.percepts if percepts] == [1, 1]
 
 
 def test_ranges_to_one_beacon_alone_are_said(tmp_path: Path) -> None:

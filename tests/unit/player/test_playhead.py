@@ -103,3 +103,12 @@ def test_how_much_was_played_can_be_asked_again() -> None:
 
     assert playhead.played() == playhead.played()
     assert playhead.played().progress == pytest.approx(0.0)
+
+
+def test_what_of_a_recording_is_not_played_is_said_once_in_the_beginning() -> None:
+    steps = _played(Walk(2, notes=["3 observations of other robots are left out"]))
+    first, second = of_type(Playback, [message for step in steps for message in step.truth])
+
+    assert first.reasons == ["3 observations of other robots are left out"]
+    assert second.reasons == []
+    assert second.skipped == 0
