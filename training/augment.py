@@ -22,7 +22,9 @@ class Augmentation:
 
     `slope` is how far the corners of the image are moved at most, as a share of its size, half as
     far up and down; `saturation` is the largest share of its colour that is taken or added;
-    `backlit_share` is that of images whose lower part gets another light than the upper.
+    `backlit_share` is that of images whose lower part gets another light than the upper, and
+    `grey_share` that of images without colour. `stretch` is how much wider or narrower an image
+    becomes, as a natural logarithm.
 
     The defaults vary little, for renderings, which have much of this variation themselves.
     """
@@ -40,48 +42,61 @@ class Augmentation:
     slope: float = 0.0
     saturation: float = 0.0
     backlit_share: float = 0.0
+    stretch: float = 0.0
+    grey_share: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class LabelledImage:
-    """An image, uint8 (h, w, 3), and, uint8 (h, w) each, how much of a pixel is road and how much
-    of it is known.
+    """An image, uint8 (h, w, 3), and, uint8 (h, w) each, how much of a pixel is road, how much a
+    building, and how much of it is known.
     """
 
     image: Bytes
     road: Bytes
+    building: Bytes
     known: Bytes
 
     @classmethod
     def of(
-        cls, image: Bytes, road: Booleans, known: Booleans, size_px: tuple[int, int] = SIZE_PX
+        cls,
+        image: Bytes,
+        road: Booleans,
+        building: Booleans,
+        known: Booleans,
+        size_px: tuple[int, int] = SIZE_PX,
     ) -> LabelledImage:
-        """Return `image` with masks of the pixels (h, w) that show road, and of those for which
-        that is known, at `size_px`: columns, rows.
+        """Return `image` with masks of the pixels (h, w) that show road, of those that show a
+        building, and of those for which that is known, at `size_px`: columns, rows.
         """
+        masks = [255 * mask.astype(np.uint8) for mask in (road, building, known)]
         small = []
-        for values in (image, 255 * road.astype(np.uint8), 255 * known.astype(np.uint8)):
+        for values in (image, *masks):
             resized = cv2.resize(values, size_px, interpolation=cv2.INTER_AREA)
             small.append(resized.astype(np.uint8, copy=False))
         return cls(*small)
 
 
 def augmented(
-    labelled: LabelledImage, how: Augmentation, rng: np.random.Generator
+    labelled: LabelledImage,
+    how: Augmentation,
+    rng: np.random.Generator,
+    size_px: tuple[int, int] = SIZE_PX,
 ) -> LabelledImage:
-    """Return a variation of `labelled`, HEIGHT_PX by WIDTH_PX."""
+    """Return a variation of `labelled`, at `size_px`: columns, rows."""
     if how.slope:
         labelled = _sloped(labelled, how.slope, rng)
 
-    matrix = _affine(labelled.image.shape[:2], how, rng)
-    image = cv2.warpAffine(labelled.image, matrix, SIZE_PX, borderMode=cv2.BORDER_REPLICATE)
-    road = cv2.warpAffine(labelled.road, matrix, SIZE_PX)
-    known = cv2.warpAffine(labelled.known, matrix, SIZE_PX)
+    matrix = _affine(labelled.image.shape[:2], how, rng, size_px)
+    image = cv2.warpAffine(labelled.image, matrix, size_px, borderMode=cv2.BORDER_REPLICATE)
+    road = cv2.warpAffine(labelled.road, matrix, size_px)
+    building = cv2.warpAffine(labelled.building, matrix, size_px)
+    known = cv2.warpAffine(labelled.known, matrix, size_px)
 
-    relit = _relit(image.astype(np.float32), how, rng)
     return LabelledImage(
-        image=relit,
+        image=relit(image.astype(np.float32), how, rng),
         road=road.astype(np.uint8),
+        building=building.astype(np.uint8),
         known=known.astype(np.uint8),
     )
 
@@ -97,25 +112,38 @@ def _sloped(labelled: LabelledImage, slope: float, rng: np.random.Generator) -> 
     size = (width, height)
     image = cv2.warpPerspective(labelled.image, matrix, size, borderMode=cv2.BORDER_REPLICATE)
     road = cv2.warpPerspective(labelled.road, matrix, size)
+    building = cv2.warpPerspective(labelled.building, matrix, size)
     known = cv2.warpPerspective(labelled.known, matrix, size)
     return LabelledImage(
         image=image.astype(np.uint8, copy=False),
         road=road.astype(np.uint8, copy=False),
+        building=building.astype(np.uint8, copy=False),
         known=known.astype(np.uint8, copy=False),
     )
 
 
-def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) -> Floats:
+def _affine(
+    size: tuple[int, ...],
+    how: Augmentation,
+    rng: np.random.Generator,
+    new_size_px: tuple[int, int],
+) -> Floats:
     """Draw the affine map, (2, 3), from pixels of an image of `size` (h, w) to those of its
-    variation: zoomed, turned, shifted and perhaps mirrored.
+    variation of that new size, columns and rows: zoomed, turned, shifted and perhaps mirrored.
     """
+    new_width, new_height = new_size_px
     zoom = np.exp(rng.uniform(*np.log(how.zoom)))
     turn_rad = np.radians(rng.uniform(-how.turn_deg, how.turn_deg))
     mirror = rng.choice((-1.0, 1.0))
 
     height, width = size
-    across = zoom * WIDTH_PX / width
-    down = zoom * HEIGHT_PX / height
+    across = zoom * new_width / width
+    down = zoom * new_height / height
+    if how.stretch:
+        stretch = np.exp(rng.uniform(-how.stretch, how.stretch) / 2)
+        across *= stretch
+        down /= stretch
+
     cos = np.cos(turn_rad)
     sin = np.sin(turn_rad)
     linear = np.array(
@@ -126,14 +154,15 @@ def _affine(size: tuple[int, ...], how: Augmentation, rng: np.random.Generator) 
     )
 
     # About the middle of the image.
-    shift_px = rng.uniform(-how.shift, how.shift, 2) * SIZE_PX
+    shift_px = rng.uniform(-how.shift, how.shift, 2) * new_size_px
     middle_px = np.array([width - 1, height - 1]) / 2
-    new_middle_px = np.array([WIDTH_PX - 1, HEIGHT_PX - 1]) / 2
+    new_middle_px = np.array([new_width - 1, new_height - 1]) / 2
     return np.column_stack([linear, new_middle_px + shift_px - linear @ middle_px])
 
 
-def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes:
-    """Show `image` (HEIGHT_PX, WIDTH_PX, 3) in another light, by another camera."""
+def relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes:
+    """Show `image` (h, w, 3) in another light, by another camera."""
+    height, width, _ = image.shape
     if rng.random() < how.blur_share:
         blurred = cv2.GaussianBlur(image, (3, 3), rng.uniform(0.4, 1.0))
         image = blurred.astype(np.float32, copy=False)
@@ -143,9 +172,12 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
         added = np.float32(rng.uniform(-how.saturation, how.saturation))
         image = np.asarray(image + (image - grey) * added, np.float32)
 
+    if how.grey_share and rng.random() < how.grey_share:
+        image = image.mean(axis=2, keepdims=True).repeat(3, axis=2)
+
     if how.backlit_share and rng.random() < how.backlit_share:
         # The ground is darker than the sky, seldom brighter.
-        rows = np.arange(HEIGHT_PX) / HEIGHT_PX
+        rows = np.arange(height) / height
         horizon = rng.uniform(0.2, 0.55)
         softness = rng.uniform(0.03, 0.4)
         below = np.clip((rows - horizon) / softness, 0, 1)
@@ -153,7 +185,7 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
         image *= np.asarray(light, np.float32)[:, None, None]
 
     if rng.random() < how.shadow_share:
-        image *= _shadow(rng)
+        image *= _shadow(height, width, rng)
 
     # The camera's response: the new level of each of 256 levels in each colour.
     contrast = rng.uniform(-how.contrast, how.contrast)
@@ -170,16 +202,18 @@ def _relit(image: Singles, how: Augmentation, rng: np.random.Generator) -> Bytes
     return np.clip(image, 0, 255).astype(np.uint8)
 
 
-def _shadow(rng: np.random.Generator) -> Singles:
-    """Draw the share of light left in a straight band of shadow, (HEIGHT_PX, WIDTH_PX, 1)."""
-    rows, columns = np.indices((HEIGHT_PX, WIDTH_PX), dtype=np.float32, sparse=True)
+def _shadow(height: int, width: int, rng: np.random.Generator) -> Singles:
+    """Draw the share of light left in a straight band of shadow, (h, w, 1)."""
+    rows, columns = np.indices((height, width), dtype=np.float32, sparse=True)
     direction_rad = rng.uniform(0, np.pi)
-    right_px = np.cos(direction_rad) * (columns - WIDTH_PX / 2)
-    across_px = right_px + np.sin(direction_rad) * (rows - HEIGHT_PX / 2)
+    right_px = np.cos(direction_rad) * (columns - width / 2)
+    across_px = right_px + np.sin(direction_rad) * (rows - height / 2)
 
-    middle_px = rng.uniform(-80, 80)
-    half_px = rng.uniform(5, 60)
-    edge_px = rng.uniform(0.5, 4.0)
+    # Drawn for images of WIDTH_PX.
+    scale = width / WIDTH_PX
+    middle_px = scale * rng.uniform(-80, 80)
+    half_px = scale * rng.uniform(5, 60)
+    edge_px = scale * rng.uniform(0.5, 4.0)
     inside_px = half_px - np.abs(across_px - middle_px)
     shade = np.clip(inside_px / edge_px + 0.5, 0, 1)
 

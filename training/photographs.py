@@ -1,5 +1,5 @@
 """Street photographs with label images, as in CamVid (Brostow, Fauqueur & Cipolla 2009), and the
-road network's IoU on them.
+IoU of road and of buildings on them.
 """
 
 from __future__ import annotations
@@ -15,8 +15,11 @@ import numpy.typing as npt
 
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Booleans, Bytes
+from cogmap.schemas.sensing import Calibration
 from cogmap.services.epam.layout.road import load
+from cogmap.services.epam.recognition.segments import Segmenter
 
+BUILDING = 1
 ROAD = 3
 UNLABELLED = 11
 IMAGE_SUFFIXES = (".png", ".jpg")
@@ -27,13 +30,14 @@ LABEL_SUFFIXES = ("annot", "_annot")
 
 @dataclass(frozen=True, eq=False)
 class Photograph:
-    """An RGB image (h, w, 3), and masks (h, w) of its pixels that show `road` and of those for
-    which that is `known`.
+    """An RGB image (h, w, 3), and masks (h, w) of its pixels that show `road`, of those that show a
+    `building`, and of those for which that is `known`.
     """
 
     name: str
     image: Bytes
     road: Booleans
+    building: Booleans
     known: Booleans
 
 
@@ -116,6 +120,7 @@ def _photograph(path: Path, label_path: Path) -> Photograph:
         name=path.stem,
         image=rgb.astype(np.uint8, copy=False),
         road=label == ROAD,
+        building=label == BUILDING,
         known=label != UNLABELLED,
     )
 
@@ -135,12 +140,46 @@ def road_iou(found_in: Callable[[Bytes], Booleans], shown: Iterable[Photograph])
     """Return the intersection over union of road, as `found_in` an image (h, w, 3) and as labelled,
     over all labelled pixels.
     """
+    return _iou(found_in, ((each, each.road) for each in shown))
+
+
+def building_iou(found_in: Callable[[Bytes], Booleans], shown: Iterable[Photograph]) -> float:
+    """Return the intersection over union of buildings, as `road_iou` does of road."""
+    return _iou(found_in, ((each, each.building) for each in shown))
+
+
+def building_mask(segmenter: Segmenter, image: Bytes) -> Booleans:
+    """Return which pixels of an RGB image (h, w, 3) are of any segment, (h, w), if no depth is
+    known.
+    """
+    height, width, _ = image.shape
+    camera = Calibration(
+        width_px=width,
+        height_px=height,
+        fx_px=float(width),
+        fy_px=float(width),
+        cx_px=width / 2,
+        cy_px=height / 2,
+        baseline_m=0.1,
+        mount_height_m=1.5,
+        mount_forward_m=0.0,
+    )
+    mask = np.zeros((height, width), bool)
+    for segment in segmenter.segments(image, np.zeros((height, width), np.float32), camera):
+        mask |= segment.mask
+
+    return mask
+
+
+def _iou(
+    found_in: Callable[[Bytes], Booleans], labelled: Iterable[tuple[Photograph, Booleans]]
+) -> float:
     both_px = 0
     either_px = 0
-    for photograph in shown:
+    for photograph, wanted in labelled:
         found = found_in(photograph.image)
-        both_px += int(np.count_nonzero(found & photograph.road & photograph.known))
-        either_px += int(np.count_nonzero((found | photograph.road) & photograph.known))
+        both_px += int(np.count_nonzero(found & wanted & photograph.known))
+        either_px += int(np.count_nonzero((found | wanted) & photograph.known))
 
     return both_px / max(either_px, 1)
 

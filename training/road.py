@@ -38,6 +38,7 @@ WEIGHT_DECAY = 0.02
 WARM_UP = 0.15
 EPOCHS = 4
 ROAD = SURFACES.index("road")
+BUILDING = SURFACES.index("building")
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,10 @@ def train_on_renderings(
     """
     held_out = track(files(folder, "val"), "testing")
     training = track(files(folder, "train"), "reading")
-    images = [LabelledImage.of(view.image, view.road, view.known) for view in _views(training)]
+    images = [
+        LabelledImage.of(view.image, view.road, view.building, view.known)
+        for view in _views(training)
+    ]
 
     schedule = Schedule(
         epochs=epochs or EPOCHS,
@@ -79,7 +83,8 @@ def _views(paths: Iterable[Path]) -> Iterator[Photograph]:
         town = read(path)
         for image, surface in zip(town.left, town.surface, strict=True):
             road = surface == ROAD
-            yield Photograph(path.stem, image, road, known=np.ones_like(road))
+            building = surface == BUILDING
+            yield Photograph(path.stem, image, road, building, known=np.ones_like(road))
 
 
 def train(

@@ -133,7 +133,11 @@ def loss(output: Tensor, wanted: Tensor) -> Tensor:
     their pixels.
     """
     building = functional.binary_cross_entropy_with_logits(output[:, 0], wanted[:, 0])
+    return building + instance_loss(output, wanted)
 
+
+def instance_loss(output: Tensor, wanted: Tensor) -> Tensor:
+    """Return the part of the loss that is about centres, and the offsets to them."""
     wanted_centre = wanted[:, 1]
     squared = (output[:, 1] - wanted_centre).square()
     centre = (squared * (1 + 8 * wanted_centre)).mean()
@@ -142,7 +146,7 @@ def loss(output: Tensor, wanted: Tensor) -> Tensor:
     error = (output[:, 2:4] - wanted[:, 2:4]).abs()
     offset = (error.sum(1) * weight).sum() / (weight.sum() + 1)
 
-    return building + 20 * centre + 2 * offset
+    return 20 * centre + 2 * offset
 
 
 def augmented(

