@@ -39,6 +39,11 @@ MIN_CENTRE = 0.3
 MIN_BUILDING = 0.5
 PEAK_PX = 9
 MIN_PIXELS = 12
+# A pixel that points to a place farther than this from every centre belongs to none of them: such
+# pixels are segments where they hang together, if they are at least so many. A quarter of the
+# view's width, and half a hundredth of its area.
+MAX_MISS_PX = 40.0
+MIN_ALONE_PIXELS = 100
 # Grey levels: an image with a smaller standard deviation shows nothing.
 MIN_CONTRAST = 3.0
 # Pieces of one building: where they meet, both point to places nearer to each other than this
@@ -179,8 +184,10 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     # Centres are the local maxima over MIN_CENTRE.
     highest = cv2.dilate(centre, np.ones((PEAK_PX, PEAK_PX), np.uint8))
     centres = np.argwhere((centre == highest) & (centre > MIN_CENTRE))
-    if not len(centres) or not len(rows):
+    if not len(rows):
         return numbers
+    if not len(centres):
+        return _alone(building, 0)
 
     pointed_row = rows + OFFSET_PX * down[building]
     pointed_column = columns + OFFSET_PX * right[building]
@@ -189,12 +196,27 @@ def _instances(output: Singles) -> npt.NDArray[np.intp]:
     # The nearest centre: the squared distance, less what is the same for all centres.
     compared_px2 = (centres**2).sum(1) - 2 * (pointed_at @ centres.T)
     numbers[building] = compared_px2.argmin(1)
-    if len(centres) == 1:
-        return numbers
+    missed_px2 = compared_px2.min(1) + (pointed_at**2).sum(1)
+    misses = np.zeros_like(building)
+    misses[building] = missed_px2 > MAX_MISS_PX**2
+    numbers[misses] = -1
+    if len(centres) > 1 and not misses[building].all():
+        pointed = np.zeros((*log_odds.shape, 2))
+        pointed[building] = pointed_at
+        numbers = _joined(numbers, pointed)
 
-    pointed = np.zeros((*log_odds.shape, 2))
-    pointed[building] = pointed_at
-    return _joined(numbers, pointed)
+    return np.where(misses, _alone(misses, len(centres)), numbers)
+
+
+def _alone(mask: Booleans, first: int) -> npt.NDArray[np.intp]:
+    """Number the areas of `mask` (h, w) that hang together from `first` on, -1 elsewhere and for
+    those with fewer than MIN_ALONE_PIXELS.
+    """
+    found = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
+    _, component, stats, _ = found
+    is_large = stats[:, cv2.CC_STAT_AREA] >= MIN_ALONE_PIXELS
+    is_large[0] = False
+    return np.where(is_large[component], component - 1 + first, -1)
 
 
 def _joined(numbers: npt.NDArray[np.intp], pointed_at: Floats) -> npt.NDArray[np.intp]:

@@ -79,6 +79,27 @@ def test_a_building_with_two_centres_is_one_segment_where_its_pixels_point_to_on
     assert whole.box_px == pytest.approx((40, 40, 240, 160), abs=1)
 
 
+def test_a_building_that_points_to_no_centre_is_a_segment_of_its_own() -> None:
+    left_box = (5, 20, 40, 60)
+    right_box = (120, 20, 155, 60)
+    shown = _answer(left_box, right_box, peaks=[(20, 40), (138, 40)])
+    shown[1, 40, 138] = 0.0
+    left, right = _divided(shown)
+
+    assert left.box_px == pytest.approx((10, 40, 70, 80), abs=1)
+    assert right.box_px == pytest.approx((240, 40, 70, 80), abs=1)
+
+
+def test_without_any_centre_areas_that_hang_together_are_segments_unless_they_are_specks() -> None:
+    building = (20, 20, 60, 60)
+    speck = (100, 20, 105, 25)
+    shown = _answer(building, speck, peaks=[(40, 40), (102, 22)])
+    shown[1] = 0.0
+    (alone,) = _divided(shown)
+
+    assert alone.box_px == pytest.approx((40, 40, 80, 80), abs=1)
+
+
 def test_buildings_that_touch_are_two_segments_where_their_pixels_point_apart() -> None:
     left_box = (20, 20, 80, 100)
     right_box = (80, 20, 140, 100)
@@ -88,13 +109,10 @@ def test_buildings_that_touch_are_two_segments_where_their_pixels_point_apart() 
     assert right.box_px[2] == pytest.approx(120, abs=1)
 
 
-def test_neither_a_speck_nor_a_building_without_a_centre_is_a_segment() -> None:
+def test_a_speck_is_no_segment() -> None:
     speck = _answer((20, 20, 23, 23), peaks=[(21, 21)])
-    assert _divided(speck) == []
 
-    without_centre = _answer((20, 20, 60, 60), peaks=[(40, 40)])
-    without_centre[1] = 0.0
-    assert _divided(without_centre) == []
+    assert _divided(speck) == []
 
 
 @pytest.mark.parametrize("level", [0, 90], ids=["black", "grey"])
