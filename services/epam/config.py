@@ -10,6 +10,7 @@ from cogmap.schemas.base import Share
 
 WeightsPath = Annotated[str, msgspec.Meta(max_length=4096)]
 Processor = Literal["cpu", "gpu"]
+WeightsSet = Literal["rendered", "camvid"]
 
 
 class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
@@ -61,9 +62,19 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             description="How what was conscious makes perception expect what goes with it."
         ),
     ] = Priming()
+    weights: Annotated[
+        WeightsSet,
+        msgspec.Meta(
+            description="The built-in networks that find road and buildings. rendered: trained on "
+            "rendered towns. camvid: for real cameras, trained on CamVid's street photographs too, "
+            "whose licence is for non-commercial use."
+        ),
+    ] = "rendered"
     segments_weights: Annotated[
         WeightsPath,
-        msgspec.Meta(description="ONNX file of the segmentation network; empty: the built-in one."),
+        msgspec.Meta(
+            description="ONNX file of the segmentation network; empty: that of `weights`."
+        ),
     ] = ""
     object_weights: Annotated[
         WeightsPath,
@@ -74,7 +85,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     ] = ""
     road_weights: Annotated[
         WeightsPath,
-        msgspec.Meta(description="ONNX file of the road network; empty: the built-in one."),
+        msgspec.Meta(description="ONNX file of the road network; empty: that of `weights`."),
     ] = ""
     processor: Annotated[
         Processor,

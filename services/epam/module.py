@@ -18,12 +18,20 @@ from cogmap.schemas.sensing import Learned, Percepts, View
 from cogmap.services.epam.association.memory import Primer
 from cogmap.services.epam.config import Config
 from cogmap.services.epam.layout import road
+from cogmap.services.epam.network import WEIGHTS
 from cogmap.services.epam.pam import ExtendedPam
 from cogmap.services.epam.places.recognizer import PlaceRecognizer
 from cogmap.services.epam.recognition import objects, segments
 from cogmap.services.epam.view import view_arrays
 
 __all__ = ["Config", "build"]
+
+CAMVID = WEIGHTS / "camvid"
+# Of each set of weights, the networks of segments and of the road.
+BUILT_IN = {
+    "rendered": (segments.DEFAULT_PATH, road.DEFAULT_PATH),
+    "camvid": (CAMVID / "segments.onnx", CAMVID / "road.onnx"),
+}
 
 
 class Perception:
@@ -129,9 +137,10 @@ class Perception:
 def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
     """Build the extended PAM as a module. Raises ConfigError if its networks cannot be read."""
     cv2.setNumThreads(1)
-    segments_path = Path(config.segments_weights or segments.DEFAULT_PATH)
+    segments_default, road_default = BUILT_IN[config.weights]
+    segments_path = Path(config.segments_weights or segments_default)
     objects_path = Path(config.object_weights or objects.DEFAULT_PATH)
-    road_path = Path(config.road_weights or road.DEFAULT_PATH)
+    road_path = Path(config.road_weights or road_default)
     pam = ExtendedPam(
         config,
         segments.load(segments_path, config.processor),

@@ -6,7 +6,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Literal
 
+import cv2
 import msgspec
 import numpy as np
 import pytest
@@ -26,7 +28,7 @@ from cogmap.schemas.sensing import Learned, Percepts, View
 from cogmap.services.epam.module import Config, build
 from cogmap.testing import of_type
 from cogmap.training.rendering.towns import render_town
-from tests.support.world.blocks import CAMERA
+from tests.support.world.blocks import CAMERA, Block, painted
 from tests.support.world.rendered import seen
 
 UNLABELLED = 4005
@@ -304,6 +306,38 @@ def test_missing_weights_are_named_with_the_remedy(weights: str, tmp_path: Path)
 
     with pytest.raises(ConfigError, match=r"nowhere\.onnx.*cogmap train"):
         build(config, "epam")
+
+
+@pytest.mark.parametrize("size", [(320, 240), (613, 185), (752, 480)])
+@pytest.mark.parametrize("weights", ["rendered", "camvid"])
+def test_a_camera_of_any_size_has_percepts_within_its_image(
+    weights: Literal["rendered", "camvid"], size: tuple[int, int]
+) -> None:
+    image, depth_m, _ = painted([Block(20.0, 9.0, 0.2, (8.0, 8.0), 6.0, (180, 60, 50))])
+    columns, rows = size
+    camera = msgspec.structs.replace(
+        CAMERA,
+        width_px=columns,
+        height_px=rows,
+        fx_px=CAMERA.fx_px * columns / CAMERA.width_px,
+        fy_px=CAMERA.fy_px * rows / CAMERA.height_px,
+        cx_px=(columns - 1) / 2,
+        cy_px=(rows - 1) / 2,
+    )
+    view = View(
+        stamp_ns=5,
+        frame=3,
+        image=Array.of(cv2.resize(image, size)),
+        depth_m=Array.of(cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)),
+        calibration=camera,
+    )
+    percepts = _percepts(build(Config(weights=weights), "epam"), view)
+
+    assert len(percepts.road_m.numpy()) > 0
+    for percept in percepts.objects:
+        left, top, width, height = percept.box_px
+        assert 0 <= left < left + width <= columns
+        assert 0 <= top < top + height <= rows
 
 
 def _broadcast(stamp_ns: int, *labels: str, feeling: Feeling = Feeling.NONE) -> Broadcast:

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import onnxruntime
 import pytest
 
 from cogmap.errors import ConfigError
 from cogmap.services.epam.config import Config
-from cogmap.services.epam.module import build
-from cogmap.services.epam.network import CPU_PROVIDER, CUDA_PROVIDER, GPU_PROVIDERS, provider_of
+from cogmap.services.epam.layout import road
+from cogmap.services.epam.module import CAMVID, build
+from cogmap.services.epam.network import (
+    CPU_PROVIDER,
+    CUDA_PROVIDER,
+    FREE_AREA_PX,
+    GPU_PROVIDERS,
+    Network,
+    provider_of,
+)
 
 COREML = "CoreMLExecutionProvider"
 
@@ -41,3 +51,26 @@ def test_a_gpu_that_is_not_there_is_refused_in_a_sentence() -> None:
 
 def test_networks_have_the_names_that_onnx_runtime_gives_its_providers() -> None:
     assert set(GPU_PROVIDERS) < set(onnxruntime.get_all_providers())
+
+
+def _road(path: Path) -> Network:
+    return Network(path, (1, road.CHANNELS, None, None), road.OUTPUT_SHAPES)
+
+
+@pytest.mark.parametrize("view", [(240, 320), (185, 613), (1080, 1920)])
+def test_a_network_of_one_size_receives_every_view_at_that_size(view: tuple[int, int]) -> None:
+    size = _road(road.DEFAULT_PATH).view_size(view, road.PADDING_PX)
+
+    assert size == (road.HEIGHT_PX, road.WIDTH_PX, road.PADDING_PX)
+
+
+@pytest.mark.parametrize("view", [(240, 320), (185, 613), (1080, 1920), (640, 480)])
+def test_a_network_of_any_size_receives_views_in_about_their_proportions(
+    view: tuple[int, int],
+) -> None:
+    height, width = view
+    size = _road(CAMVID / "road.onnx").view_size(view, road.PADDING_PX)
+
+    assert size.width_px / size.height_px == pytest.approx(width / height, rel=0.15)
+    assert size.width_px * size.height_px == pytest.approx(FREE_AREA_PX, rel=0.12)
+    assert size.padding_px == 0
