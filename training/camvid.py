@@ -72,6 +72,8 @@ BATCH = 16
 MAX_RATE = 4e-3
 WEIGHT_DECAY = 0.02
 WARM_UP = 0.15
+# Of each batch, so many examples are for what parts buildings.
+PARTED = 4
 DEPTH_DROPPED_SHARE = 0.5
 # Gaps in an area of building, behind lamps and signs, that do not part it.
 CLOSING = np.ones((5, 5), np.uint8)
@@ -182,7 +184,7 @@ def fit(known: Examples, *, seed: int, epochs: int | None = None) -> Decoder:
     """Return a decoder trained on these examples."""
     seed_torch(seed)
     rng = np.random.default_rng([seed, 0xDEC0])
-    decoder = Decoder()
+    decoder = Decoder().to(memory_format=torch.channels_last)
     steps = max(1, (epochs or EPOCHS) * len(known.drive) // BATCH)
     batch = min(BATCH, len(known.drive))
     optimizer = Optimizer(decoder.parameters(), steps, MAX_RATE, WEIGHT_DECAY, WARM_UP)
@@ -192,8 +194,8 @@ def fit(known: Examples, *, seed: int, epochs: int | None = None) -> Decoder:
     with Progress() as progress:
         task = progress.add_task("training", total=steps)
         for chosen in shuffled(len(known.drive), batch, steps, rng):
-            features = [torch.from_numpy(of[chosen].astype(np.float32)) for of in known.features]
-            depth = torch.from_numpy(known.depth[chosen].astype(np.float32))
+            features = [_tensor(of[chosen]) for of in known.features]
+            depth = _tensor(known.depth[chosen[:PARTED]])
             found = decoder(features, positions.expand(batch, -1, -1, -1), depth)
             value = optimizer.step(_loss(found, known, chosen))
             progress.update(task, advance=1, description=f"training, loss {value:.3f}")
@@ -301,16 +303,25 @@ def _areas(building: Booleans) -> Bytes:
     return np.asarray(np.minimum(numbers, 255) * building, np.uint8)
 
 
-def _loss(found: tuple[Tensor, Tensor], known: Examples, chosen: npt.NDArray[np.intp]) -> Tensor:
+def _tensor(values: Halves) -> Tensor:
+    single = torch.from_numpy(values.astype(np.float32))
+    return single.contiguous(memory_format=torch.channels_last)
+
+
+def _loss(
+    found: tuple[Tensor, Tensor, Tensor], known: Examples, chosen: npt.NDArray[np.intp]
+) -> Tensor:
     """Return the loss of the network's outputs for the examples `chosen`."""
-    road_odds, shown = found
+    road_odds, building_odds, shown = found
     is_known = torch.from_numpy(known.known[chosen].astype(np.float32)) / 255
     is_road = torch.from_numpy(known.road[chosen].astype(np.float32)) / 255
-    wanted = torch.from_numpy(np.stack([target(known.label[number]) for number in chosen]))
+    is_building = torch.from_numpy((known.label[chosen] > 0).astype(np.float32))
+    parted = [target(known.label[number]) for number in chosen[:PARTED]]
 
     of_road = _surprise(road_odds[:, 0], is_road, is_known)
-    of_building = _surprise(shown[:, 0], wanted[:, 0], is_known)
-    return of_road + of_building + instance_loss(shown, wanted)
+    of_building = _surprise(building_odds[:, 0], is_building, is_known)
+    of_parts = instance_loss(shown, torch.from_numpy(np.stack(parted)))
+    return of_road + of_building + of_parts
 
 
 def _surprise(log_odds: Tensor, wanted: Tensor, known: Tensor) -> Tensor:
@@ -320,7 +331,7 @@ def _surprise(log_odds: Tensor, wanted: Tensor, known: Tensor) -> Tensor:
 
 
 def _positions() -> Singles:
-    """Return column and row of each coarse pixel, from -1 to 1, (1, 2, h / 16, w / 16)."""
+    """Return column and row of each coarse pixel, from -1 to 1, (1, 2, h / 32, w / 32)."""
     columns, rows = SIZE_PX
     plain = np.zeros((1, rows, columns, 3), np.uint8)
     positions = road.network_input(plain, padding_px=0)[0, 3:5]

@@ -12,41 +12,34 @@ from torch.nn import functional
 
 from cogmap.training.networks.encoder import FEATURES, Encoder
 
-WIDTH = 32
+WIDTH = 48
 POSITIONS = 2
 DEPTHS = 3
 DROPPED_SHARE = 0.1
-# The features that are joined, the strides of their coarsest and of their finest, and how often the
-# coarsest of all are enlarged to the finest.
-PYRAMID = FEATURES[:-1]
-COARSE = 16
+# Strides of the coarsest and of the finest features.
+COARSE = 32
 FINEST = 4
-CONTEXT_SCALE = 8
 
 
 class Decoder(nn.Module):
-    """Features of `Encoder`, positions (n, 2, h / 16, w / 16) and depth (n, 3, h / 4, w / 4) to log
+    """Features of `Encoder`, positions (n, 2, h / 32, w / 32) and depth (n, 3, h / 4, w / 4) to log
     odds of road (n, 1, h / 2, w / 2), and to what `services/epam/recognition/segments.py` reads,
     (n, 4, h / 2, w / 2).
 
     Features are added from the coarser to the finer ones (Lin et al. 2017, feature pyramid), with
-    the mean of the whole image for its light. The coarsest ones, which have most of the weights,
-    are for buildings alone: a glass front is a building by what stands around it. Only where a
-    building is parted from the next depends on depth: no photograph that shows what is a building
-    has any.
+    the mean of the whole image for its light. Only where a building is parted from the next depends
+    on depth, as no photograph that shows what is a building has any; what is learned of that does
+    not change what road and buildings are found by.
     """
 
     def __init__(self) -> None:
         super().__init__()
-        self.sideways = nn.ModuleList(_sideways(channels) for channels in PYRAMID)
+        self.sideways = nn.ModuleList(_sideways(channels) for channels in FEATURES)
         self.position = nn.Conv2d(POSITIONS, WIDTH, 1)
-        self.whole = nn.Conv2d(PYRAMID[-1], WIDTH, 1)
+        self.whole = nn.Conv2d(FEATURES[-1], WIDTH, 1)
         self.around = nn.Sequential(_separable(WIDTH), _separable(WIDTH, dilation=2))
-        self.mixed = nn.ModuleList(_separable(WIDTH) for _ in PYRAMID)
+        self.mixed = nn.ModuleList(_separable(WIDTH) for _ in FEATURES)
         self.road_head = nn.Conv2d(WIDTH, 1, 1)
-
-        self.context = nn.Sequential(_sideways(FEATURES[-1]), nn.ReLU(), _separable(WIDTH))
-        self.in_context = _separable(WIDTH)
         self.building_head = nn.Conv2d(WIDTH, 1, 1)
 
         self.depth = nn.Sequential(nn.Conv2d(DEPTHS, WIDTH, 3, padding=1), nn.ReLU())
@@ -56,10 +49,13 @@ class Decoder(nn.Module):
 
     def forward(
         self, features: Sequence[Tensor], positions: Tensor, depth: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        """Return the two outputs."""
+    ) -> tuple[Tensor, Tensor, Tensor]:
+        """Return log odds of road and of buildings, (n, 1, h / 2, w / 2) each, and the second
+        output of the first examples, as many as `depth` has.
+        """
         values = self._joined(features, positions)
-        return self._road(values), self._shown(values, features[-1], depth)
+        building = _enlarged(self.building_head(values), 2)
+        return self._road(values), building, self._shown(values[: len(depth)], depth)
 
     def road(self, features: Sequence[Tensor], positions: Tensor) -> Tensor:
         """Return the first output alone."""
@@ -67,15 +63,15 @@ class Decoder(nn.Module):
 
     def shown(self, features: Sequence[Tensor], positions: Tensor, depth: Tensor) -> Tensor:
         """Return the second output alone."""
-        return self._shown(self._joined(features, positions), features[-1], depth)
+        return self._shown(self._joined(features, positions), depth)
 
     def _joined(self, features: Sequence[Tensor], positions: Tensor) -> Tensor:
-        """Join all features but the coarsest, (n, WIDTH, h / 4, w / 4)."""
-        coarse = features[len(PYRAMID) - 1]
+        """Join all features at the finest resolution, (n, WIDTH, h / 4, w / 4)."""
+        coarse = features[-1]
         placed = self.sideways[-1](coarse) + self.position(positions)
         values = functional.relu(placed + self.whole(coarse.mean((2, 3), keepdim=True)))
         values = self.mixed[-1](values + self.around(values))
-        for number in range(len(PYRAMID) - 2, -1, -1):
+        for number in range(len(FEATURES) - 2, -1, -1):
             finer = self.sideways[number](features[number])
             values = self.mixed[number](functional.relu(finer + _enlarged(values, 2)))
 
@@ -84,10 +80,8 @@ class Decoder(nn.Module):
     def _road(self, values: Tensor) -> Tensor:
         return _enlarged(self.road_head(values), 2)
 
-    def _shown(self, values: Tensor, coarsest: Tensor, depth: Tensor) -> Tensor:
-        context = _enlarged(self.context(coarsest), CONTEXT_SCALE)
-        values = self.in_context(functional.relu(values + context))
-        instance = self.instance(torch.cat([values, self.depth(depth)], dim=1))
+    def _shown(self, values: Tensor, depth: Tensor) -> Tensor:
+        instance = self.instance(torch.cat([values.detach(), self.depth(depth)], dim=1))
         return _enlarged(torch.cat([self.building_head(values), instance], dim=1), 2)
 
 
