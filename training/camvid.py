@@ -65,8 +65,9 @@ STRONG = Augmentation(
     stretch=0.4,
     grey_share=0.15,
 )
-# Few photographs: each is seen in so many variations, and each variation so often.
-VARIATIONS = 4
+# Few photographs: each is seen in so many variations that there are about EXAMPLES, four of each of
+# CamVid's training photographs, and each variation so often.
+EXAMPLES = 1500
 EPOCHS = 2
 BATCH = 16
 MAX_RATE = 4e-3
@@ -151,7 +152,7 @@ def examples(
 ) -> Examples:
     """Return `variations` of each photograph, and each view of `towns`, in other light."""
     rng = np.random.default_rng([seed, 0x0F07])
-    count = variations or VARIATIONS
+    count = variations or max(1, round(EXAMPLES / len(shown)))
     with tempfile.TemporaryDirectory() as folder, Progress() as progress:
         network = _runnable(encoder, Path(folder) / "encoder.onnx")
         rows = []
