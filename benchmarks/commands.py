@@ -63,7 +63,7 @@ def benchmarks() -> None:
             type=click.Path(exists=True, file_okay=False, path_type=Path),
             metavar="DIR",
             help="Sets that others published, a folder each: mrclam6, pose_graphs, stereo_cones, "
-            "camvid, kitti_stereo, street_grids, tsplib, human_tsp.",
+            "camvid, corridor, kitti_stereo, street_grids, tsplib, human_tsp.",
         ),
         click.Option(
             ["--only"],

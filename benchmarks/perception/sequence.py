@@ -19,7 +19,7 @@ from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.polylines import distances_along
 from cogmap.robot import NEAREST_DEPTH_M, calibration
 from cogmap.schemas.sensing import PlaceMatch, Pose
-from cogmap.services.epam.public import PlaceRecognizer
+from cogmap.services.epam.public import PlaceRecognizer, backbone, descriptor
 from cogmap.services.sensory.public import DepthFromStereo, rectification
 from cogmap.services.sim.public import town
 from cogmap.services.sim.rendering.public import Light, StereoCamera, World, some_light
@@ -77,6 +77,7 @@ def measure() -> Metrics:
 
 def drive(recognizer: PlaceRecognizer, first_frame: int, place: town.Town) -> Iterator[Answer]:
     """Drive through a town and ask `recognizer` at each view; frames count from `first_frame`."""
+    features = backbone.load()
     world = World(place)
     frame = first_frame
 
@@ -92,7 +93,11 @@ def drive(recognizer: PlaceRecognizer, first_frame: int, place: town.Town) -> It
                 left_eye, right_eye = camera.capture_labelled(stretch.light, rng)
                 left, right = straight.apply(left_eye.image, right_eye.image)
                 depth_m = stereo.depth_m(left, right)
-                matches, _ = recognizer.observe(frame, frame * FRAME_NS, left, depth_m)
+
+                code = None
+                if descriptor.shows_place(left, depth_m):
+                    code = descriptor.code(features.features(left))
+                matches, _ = recognizer.observe(frame, frame * FRAME_NS, code)
                 yield Answer(place.seed, stretch.part, pose, matches[0] if matches else None)
                 frame += 1
     finally:

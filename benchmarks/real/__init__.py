@@ -1,0 +1,1 @@
+"""What nobody simulated: the product's modules on recordings of real cameras."""

@@ -15,11 +15,14 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Broadcast, Competition
 from cogmap.schemas.sensing import Learned, Percepts, View
+from cogmap.services.epam import backbone
 from cogmap.services.epam.association.memory import Primer
+from cogmap.services.epam.backbone import Backbone
 from cogmap.services.epam.config import Config
 from cogmap.services.epam.layout import road
 from cogmap.services.epam.network import WEIGHTS
 from cogmap.services.epam.pam import ExtendedPam
+from cogmap.services.epam.places import descriptor
 from cogmap.services.epam.places.recognizer import PlaceRecognizer
 from cogmap.services.epam.recognition import objects, segments
 from cogmap.services.epam.view import view_arrays
@@ -40,9 +43,15 @@ class Perception:
     """
 
     def __init__(
-        self, pam: ExtendedPam, places: PlaceRecognizer, primer: Primer, in_lockstep: bool
+        self,
+        pam: ExtendedPam,
+        features: Backbone,
+        places: PlaceRecognizer,
+        primer: Primer,
+        in_lockstep: bool,
     ) -> None:
         self._pam = pam
+        self._backbone = features
         self._places = places
         self._primer = primer
         self._in_lockstep = in_lockstep
@@ -87,10 +96,13 @@ class Perception:
         learning = self._last_learned is None or not _same_view(view, self._last_learned)
         associations = self._primer.begin(view.stamp_ns)
         prior = self._primer.prior(view.stamp_ns)
+
+        # The features are found beside the objects.
+        shows_place = descriptor.shows_place(arrays.image, arrays.depth_m)
+        features = self._backbone.begin(arrays.image) if shows_place else None
         perceived = self._pam.perceive(arrays, view.calibration, learning, prior)
-        matches, remembered = self._places.observe(
-            view.frame, view.stamp_ns, arrays.image, arrays.depth_m, learning
-        )
+        code = None if features is None else descriptor.code(features.features())
+        matches, remembered = self._places.observe(view.frame, view.stamp_ns, code, learning)
         percepts = Percepts(
             stamp_ns=view.stamp_ns,
             frame=view.frame,
@@ -148,7 +160,8 @@ def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:
         road.load(road_path, config.processor),
     )
     primer = Primer(config.priming)
-    perception = Perception(pam, PlaceRecognizer(), primer, run.lockstep)
+    features = backbone.load(processor=config.processor)
+    perception = Perception(pam, features, PlaceRecognizer(), primer, run.lockstep)
 
     published = (topics.PERCEPTS, topics.LEARNED)
     return (

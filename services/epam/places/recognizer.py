@@ -3,9 +3,11 @@ places without a landmark in sight.
 
 A single view may be ambiguous, so views are accumulated while the robot moves: a Bayes filter (a
 hidden Markov model) holds the probability that the robot is where a remembered view was taken, or
-somewhere new. From one view to the next the place advances by none to three remembered ones,
-whatever the speed. A place that is recognized is not remembered again (Churchill and Newman 2012),
-so memory grows with what is new.
+somewhere new. How likely a view is at a place follows from how far its similarity is beyond what
+different places have in common by chance (chance.py), which is estimated on the way: it is another
+in every town, light and camera. From one view to the next the place advances by none to three
+remembered ones, whatever the speed. A place that is recognized is not remembered again (Churchill
+and Newman 2012), so memory grows with what is new.
 """
 
 from __future__ import annotations
@@ -18,29 +20,27 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Bytes, Singles
 from cogmap.schemas.array import Array
 from cogmap.schemas.sensing import PlaceMatch, RememberedView
-from cogmap.services.epam.places.descriptor import (
-    DESCRIPTOR_BYTES,
-    UNSHIFTED,
-    descriptors,
-    has_near_structure,
-    unit_vectors,
-)
+from cogmap.services.epam.places.chance import Chance
+from cogmap.services.epam.places.descriptor import CODE_BYTES
+from cogmap.services.epam.places.standard import Standard
 
-# Chosen on laps in the towns of seeds 2007 to 2010, in which every threshold of at least 0.6 gave
-# no false match.
 MATCH_THRESHOLD = 0.9
 P_ADVANCE = (0.1, 0.4, 0.35, 0.15)
 P_FOUND = 0.02
 P_LOST = 0.03
-LOG_ODDS_SLOPE = 15.0
-EVEN_SIMILARITY = 0.7
-MAX_LOG_ODDS = 3.0
+# In standard deviations beyond chance: there a view is as likely at this place as at another. And
+# what one more adds to the logarithm of the odds, within limits: views that follow each other are
+# not independent.
+EVEN_SCORE = 2.0
+LOG_ODDS_SLOPE = 1.5
+MIN_LOG_ODDS = -3.0
+MAX_LOG_ODDS = 4.0
 NEIGHBOURS = 4
-# Consecutive views that are more similar show a robot at rest.
-SIMILARITY_AT_REST = 0.97
+# A view that differs less from the last, in standard deviations, shows a robot at rest.
+CHANGE_AT_REST = 0.25
 # So many last views do not match.
 RECENT_VIEWS = 30
-# Of views: some hours of driving; each takes 2 KB.
+# Of views: some hours of driving; each takes 8 KB.
 CAPACITY = 20_000
 INITIAL_CAPACITY = 256
 # Several are forgotten at once, since all other vectors move up.
@@ -55,14 +55,17 @@ class PlaceRecognizer:
     def __init__(self, capacity: int = CAPACITY) -> None:
         self._capacity = capacity
         self._views: list[RememberedView] = []
-        self._vectors: Singles = np.empty((INITIAL_CAPACITY, DESCRIPTOR_BYTES), np.float32)
+        self._vectors: Singles = np.empty((INITIAL_CAPACITY, CODE_BYTES), np.float32)
         self._step_of_view = np.empty(0, np.int64)
+        self._standard = Standard()
+        self._chance = Chance()
 
         self._belief = np.empty(0)
         self._p_new = 1.0
 
         self._step = 0
-        self._last_vector: Singles | None = None
+        self._last_code: Bytes | None = None
+        self._nearest: int | None = None
         self._matches: list[PlaceMatch] = []
 
     @property
@@ -70,34 +73,37 @@ class PlaceRecognizer:
         """Return every view remembered, the oldest first."""
         return iter(self._views)
 
+    @property
+    def nearest(self) -> RememberedView | None:
+        """Return the view that the last one is most like, by itself, of those that may match."""
+        return None if self._nearest is None else self._views[self._nearest]
+
     def observe(
-        self, frame: int, view_ns: int, image: Bytes, depth_m: Singles, learning: bool = True
+        self, frame: int, view_ns: int, code: Bytes | None, learning: bool = True
     ) -> tuple[list[PlaceMatch], list[RememberedView]]:
         """Return at most one remembered view that this one matches, and the view itself if it is
         remembered, which needs `learning`.
 
-        The image is uint8 (h, w, 3) with its depth (h, w), 0 unknown. At rest the last match is
-        returned again. A view without near structure or contrast shows no place.
+        `code` is uint8 (CODE_BYTES,), None of a view that shows no place. At rest the last match is
+        returned again.
         """
-        codes = descriptors(image) if has_near_structure(depth_m) else None
-        if codes is None:
+        if code is None:
             return [], []
 
-        vectors = unit_vectors(codes)
-        vector = vectors[UNSHIFTED]
-        last = self._last_vector
-        if last is not None and float(vector @ last) > SIMILARITY_AT_REST:
+        last = self._last_code
+        if last is not None and self._standard.change(code, last) < CHANGE_AT_REST:
             return list(self._matches), []
 
-        self._last_vector = vector
+        self._last_code = code
         self._step += 1
-        self._update_belief(vectors)
+        vector = self._standard.add(code)
+        self._update_belief(vector)
         self._matches = self._likeliest_match()
         if self._matches or not learning:
             return list(self._matches), []
 
-        view = RememberedView(frame=frame, view_ns=view_ns, code=Array.of(codes[UNSHIFTED]))
-        self._remember([view], vectors[UNSHIFTED : UNSHIFTED + 1])
+        view = RememberedView(frame=frame, view_ns=view_ns, code=Array.of(code))
+        self._remember([view], vector[None])
         return [], [view]
 
     def restore(self, views: Iterable[RememberedView]) -> None:
@@ -111,22 +117,20 @@ class PlaceRecognizer:
         codes = []
         for view in restored:
             code = view.code
-            if (code.dtype, code.shape) != ("|u1", (DESCRIPTOR_BYTES,)):
+            if (code.dtype, code.shape) != ("|u1", (CODE_BYTES,)):
                 raise MessageError(
-                    f"remembered view {view.frame}: expected a uint8 code of {DESCRIPTOR_BYTES}, "
+                    f"remembered view {view.frame}: expected a uint8 code of {CODE_BYTES}, "
                     f"got {code.dtype} {code.shape}; delete EPAM's journal"
                 )
             codes.append(code.numpy().astype(np.uint8, copy=False))
 
-        vectors = unit_vectors(np.stack(codes))
+        vectors = np.stack([self._standard.add(code) for code in codes])
         self._step += len(restored)
         self._remember(restored, vectors)
-        self._last_vector = vectors[-1]
+        self._last_code = codes[-1]
 
-    def _update_belief(self, vectors: Singles) -> None:
-        """Advance the filter by one step: prediction, then the evidence of `vectors`, by the most
-        similar turn of the view.
-        """
+    def _update_belief(self, vector: Singles) -> None:
+        """Advance the filter by one step: prediction, then the evidence of `vector`."""
         if not self._views:
             return
 
@@ -143,11 +147,13 @@ class PlaceRecognizer:
 
         # How much likelier each remembered view's place makes the observed one than another place;
         # recent views do not match.
-        similarities = self._vectors[:count] @ vectors.T
-        highest = similarities.max(axis=1).astype(np.float64)
-        log_odds = LOG_ODDS_SLOPE * (highest - EVEN_SIMILARITY)
-        ratios = np.exp(log_odds.clip(-MAX_LOG_ODDS, MAX_LOG_ODDS))
-        ratios[self._step_of_view > self._step - RECENT_VIEWS] = 0.0
+        old = int(np.searchsorted(self._step_of_view, self._step - RECENT_VIEWS, side="right"))
+        similarities = self._vectors[:old] @ vector
+        self._nearest = int(similarities.argmax()) if old else None
+        scores = self._chance.scores(similarities.astype(np.float64))
+        log_odds = LOG_ODDS_SLOPE * (scores - EVEN_SCORE)
+        ratios = np.zeros(count)
+        ratios[:old] = np.exp(log_odds.clip(MIN_LOG_ODDS, MAX_LOG_ODDS))
 
         belief = prior * ratios
         total = belief.sum() + p_new
@@ -174,12 +180,13 @@ class PlaceRecognizer:
         before = len(self._views)
         count = before + len(views)
         if count > len(self._vectors):
-            larger = np.empty((2 * count, DESCRIPTOR_BYTES), np.float32)
+            larger = np.empty((2 * count, CODE_BYTES), np.float32)
             larger[:before] = self._vectors[:before]
             self._vectors = larger
 
         self._views += views
         self._vectors[before:count] = vectors
+        self._chance.remember(len(views))
         steps = np.arange(self._step - len(views), self._step) + 1
         self._step_of_view = np.concatenate([self._step_of_view, steps])
         self._belief = np.concatenate([self._belief, np.zeros(len(views))])
@@ -192,4 +199,6 @@ class PlaceRecognizer:
         self._vectors[: len(kept)] = kept
         self._views = self._views[oldest:]
         self._step_of_view = self._step_of_view[oldest:]
+        self._chance.forget(oldest)
+        self._nearest = None
         self._belief = self._belief[oldest:]

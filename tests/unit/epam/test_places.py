@@ -5,6 +5,7 @@ another heading.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cache
 
 import cv2
 import numpy as np
@@ -14,10 +15,12 @@ import pytest
 from cogmap.errors import MessageError
 from cogmap.schemas.array import Array
 from cogmap.schemas.sensing import PlaceMatch, RememberedView
-from cogmap.services.epam.places.descriptor import DESCRIPTOR_BYTES
+from cogmap.services.epam import backbone
+from cogmap.services.epam.places.descriptor import CODE_BYTES, code, shows_place
 from cogmap.services.epam.places.recognizer import PlaceRecognizer
 
 Image = npt.NDArray[np.uint8]
+Code = npt.NDArray[np.uint8]
 HEIGHT = 240
 WIDTH = 320
 LENGTH = 60
@@ -25,6 +28,16 @@ NEAR = np.full((HEIGHT, WIDTH), 10.0, np.float32)
 PERIOD_NS = 200_000_000
 SIDEWAYS_PX = 20
 DUSK = np.array([1.1, 1.0, 0.85])
+
+
+@cache
+def _backbone() -> backbone.Backbone:
+    return backbone.load()
+
+
+def _code(image: Image) -> Code | None:
+    """The code of a view of what is near."""
+    return code(_backbone().features(image)) if shows_place(image, NEAR) else None
 
 
 class Route:
@@ -53,14 +66,23 @@ class Route:
         levels = np.clip(255 * (picture + noise), 0, 255)
         return np.asarray(levels, np.uint8)
 
+    def code(self, place: float, aside_px: int = 0, evening: bool = False) -> Code | None:
+        """The code of that view."""
+        return _code(self.view(place, aside_px, evening))
+
+
+@cache
+def _route(seed: int) -> Route:
+    return Route(seed)
+
 
 def _drive(
-    recognizer: PlaceRecognizer, views: list[Image], first: int = 0
+    recognizer: PlaceRecognizer, views: list[Code | None], first: int = 0
 ) -> tuple[list[PlaceMatch | None], list[RememberedView]]:
     matches: list[PlaceMatch | None] = []
     remembered = []
-    for number, image in enumerate(views, first):
-        found, new = recognizer.observe(number, PERIOD_NS * number, image, NEAR)
+    for number, view in enumerate(views, first):
+        found, new = recognizer.observe(number, PERIOD_NS * number, view)
         assert len(found) <= 1
         matches.append(found[0] if found else None)
         remembered += new
@@ -68,12 +90,13 @@ def _drive(
     return matches, remembered
 
 
-def _along(route: Route, places: Iterable[float]) -> list[Image]:
-    """The views of a route at some of its places."""
-    return [route.view(place) for place in places]
+def _along(route: Route, places: Iterable[float]) -> list[Code | None]:
+    """The codes of the views of a route at some of its places."""
+    return [route.code(place) for place in places]
 
 
-def _lap(route: Route) -> list[Image]:
+@cache
+def _lap(route: Route) -> list[Code | None]:
     return _along(route, range(LENGTH))
 
 
@@ -84,10 +107,10 @@ def _recognizer_after(route: Route) -> PlaceRecognizer:
 
 
 def test_a_route_is_recognized_in_other_light_at_other_speed_and_heading() -> None:
-    route = Route(1)
+    route = _route(1)
     recognizer = _recognizer_after(route)
     places = np.arange(0, LENGTH - 30, 1.4)
-    evening = [route.view(place, 10, evening=True) for place in places]
+    evening = [route.code(place, 10, evening=True) for place in places]
 
     matches, _ = _drive(recognizer, evening, LENGTH)
 
@@ -102,8 +125,8 @@ def test_a_route_is_recognized_in_other_light_at_other_speed_and_heading() -> No
 
 
 def test_on_a_new_route_nothing_matches_and_every_view_is_remembered() -> None:
-    recognizer = _recognizer_after(Route(1))
-    new_route = Route(2)
+    recognizer = _recognizer_after(_route(1))
+    new_route = _route(2)
 
     matches, remembered = _drive(recognizer, _lap(new_route), LENGTH)
     frames = [view.frame for view in remembered]
@@ -113,28 +136,28 @@ def test_on_a_new_route_nothing_matches_and_every_view_is_remembered() -> None:
 
 
 def test_a_single_view_is_no_match() -> None:
-    route = Route(1)
-    other = Route(2)
+    route = _route(1)
+    other = _route(2)
     recognizer = _recognizer_after(route)
     before = _along(other, range(10))
     after = _along(other, range(10, 20))
 
-    matches, _ = _drive(recognizer, [*before, route.view(15), *after], LENGTH)
+    matches, _ = _drive(recognizer, [*before, route.code(15), *after], LENGTH)
 
     assert not any(matches)
 
 
 def test_the_most_recent_views_do_not_match() -> None:
-    there = _along(Route(1), range(12))
+    there = _along(_route(1), range(12))
     matches, _ = _drive(PlaceRecognizer(), [*there, *there])
 
     assert not any(matches)
 
 
 def test_a_recognized_place_is_not_remembered_again() -> None:
-    route = Route(1)
+    route = _route(1)
     recognizer = _recognizer_after(route)
-    evening = [route.view(place, evening=True) for place in range(30)]
+    evening = [route.code(place, evening=True) for place in range(30)]
 
     matches, remembered = _drive(recognizer, evening, LENGTH)
 
@@ -145,11 +168,11 @@ def test_a_recognized_place_is_not_remembered_again() -> None:
 
 def test_a_robot_at_rest_remembers_one_view() -> None:
     rng = np.random.default_rng(0)
-    image = Route(1).view(3).astype(np.int16)
+    image = _route(1).view(3).astype(np.int16)
     noisy = []
     for _ in range(20):
         values = image + rng.normal(0, 5, image.shape)
-        noisy.append(np.clip(values, 0, 255).astype(np.uint8))
+        noisy.append(_code(np.clip(values, 0, 255).astype(np.uint8)))
 
     _, remembered = _drive(PlaceRecognizer(), noisy)
 
@@ -157,7 +180,7 @@ def test_a_robot_at_rest_remembers_one_view() -> None:
 
 
 def test_at_rest_the_last_match_is_returned_again() -> None:
-    route = Route(1)
+    route = _route(1)
     recognizer = _recognizer_after(route)
     until_rest = _along(route, (5, 6, 7, 8, 9, 10, 10, 10))
 
@@ -177,47 +200,58 @@ def test_at_rest_the_last_match_is_returned_again() -> None:
     ],
     ids=["black", "blank", "of no known depth", "of what is far off alone"],
 )
-def test_a_view_that_shows_no_place_is_neither_remembered_nor_matched(
+def test_a_view_of_nothing_near_shows_no_place(
     image: Image, depth_m: npt.NDArray[np.float32]
 ) -> None:
-    route = Route(1)
+    assert not shows_place(image, depth_m)
+
+
+def test_a_view_of_what_is_near_or_of_a_camera_without_depth_shows_a_place() -> None:
+    image = _route(1).view(4)
+
+    assert shows_place(image, NEAR)
+    assert shows_place(image, None)
+
+
+def test_a_view_that_shows_no_place_is_neither_remembered_nor_matched() -> None:
+    route = _route(1)
     recognizer = _recognizer_after(route)
 
     matches, _ = _drive(recognizer, _along(route, range(10)), LENGTH)
     assert matches[-1] is not None
 
-    assert recognizer.observe(99, 99, image, depth_m) == ([], [])
+    assert recognizer.observe(99, 99, None) == ([], [])
 
 
 def test_views_remembered_before_a_restart_are_recognized_after_it() -> None:
-    route = Route(1)
+    route = _route(1)
     recognizer = _recognizer_after(route)
     restarted = PlaceRecognizer()
     for view in recognizer.all:
         restarted.restore([view])
     assert list(restarted.all) == list(recognizer.all)
 
-    again = [route.view(place, evening=True) for place in range(30)]
+    again = [route.code(place, evening=True) for place in range(30)]
     matches, _ = _drive(restarted, again, LENGTH)
     frames = [match.frame for match in matches[5:] if match]
     assert frames == list(range(5, 30))
 
 
 def test_at_rest_after_a_restart_no_view_is_remembered_again() -> None:
-    route = Route(1)
+    route = _route(1)
     recognizer = _recognizer_after(route)
     restarted = PlaceRecognizer()
     restarted.restore(recognizer.all)
-    last = route.view(LENGTH - 1)
+    last = route.code(LENGTH - 1)
 
-    assert restarted.observe(LENGTH, LENGTH, last, NEAR) == ([], [])
+    assert restarted.observe(LENGTH, LENGTH, last) == ([], [])
 
 
 def test_beyond_the_capacity_the_oldest_views_are_forgotten() -> None:
-    first = Route(1)
-    third = Route(3)
+    first = _route(1)
+    third = _route(3)
     recognizer = PlaceRecognizer(capacity=150)
-    _drive(recognizer, [*_lap(first), *_lap(Route(2)), *_lap(third)])
+    _drive(recognizer, [*_lap(first), *_lap(_route(2)), *_lap(third)])
 
     kept = [view.frame for view in recognizer.all]
     assert len(kept) <= 150
@@ -231,8 +265,8 @@ def test_beyond_the_capacity_the_oldest_views_are_forgotten() -> None:
 
 
 def test_the_same_views_give_the_same_answers() -> None:
-    route = Route(1)
-    again = [route.view(place, 6, evening=True) for place in range(20)]
+    route = _route(1)
+    again = [route.code(place, 6, evening=True) for place in range(20)]
     views = [*_lap(route), *again]
 
     first_answers = _drive(PlaceRecognizer(), views)
@@ -242,10 +276,10 @@ def test_the_same_views_give_the_same_answers() -> None:
 
 
 @pytest.mark.parametrize(
-    "code", [np.zeros(DESCRIPTOR_BYTES - 1, np.uint8), np.zeros(DESCRIPTOR_BYTES, np.float32)]
+    "wrong", [np.zeros(CODE_BYTES - 1, np.uint8), np.zeros(CODE_BYTES, np.float32)]
 )
-def test_a_descriptor_of_another_type_or_size_is_refused(code: npt.NDArray[np.generic]) -> None:
-    view = RememberedView(frame=5, view_ns=5, code=Array.of(code))
+def test_a_code_of_another_type_or_size_is_refused(wrong: npt.NDArray[np.generic]) -> None:
+    view = RememberedView(frame=5, view_ns=5, code=Array.of(wrong))
 
-    with pytest.raises(MessageError, match="remembered view 5: expected a uint8 code of 384"):
+    with pytest.raises(MessageError, match="remembered view 5: expected a uint8 code of 1600"):
         PlaceRecognizer().restore([view])
