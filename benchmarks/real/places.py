@@ -45,16 +45,17 @@ def measure(reference: Path, query: Path) -> Metrics:
     One view alone: the most similar of the first walk. By the views that led to it: all that is
     remembered may match, views of the second walk too, and those that match nothing are remembered.
     """
-    walks = [_codes(folder) for folder in (reference, query)]
-    first = len(walks[0])
+    learned = _codes(reference)
+    asked = _codes(query)
+    first = len(learned)
 
-    alone = _walk(*walks, learning=False)[first:]
+    alone = _walk(learned, asked, learning=False)[first:]
     ranked = [
         answer.nearest is not None and _is_same(answer.nearest, number)
         for number, answer in enumerate(alone)
     ]
 
-    answers = _walk(*walks, learning=True)
+    answers = _walk(learned, asked, learning=True)
     right = np.array(
         [
             frame >= first
@@ -67,7 +68,7 @@ def measure(reference: Path, query: Path) -> Metrics:
     wrong = (score > 0) & ~right
     highest_wrong = float(score[wrong].max(initial=0.0))
     sure = right & (score > highest_wrong)
-    count = max(1, len(walks[1]))
+    count = len(asked)
 
     return {
         "recall_at_1": sum(ranked) / count,
@@ -116,7 +117,7 @@ def _codes(folder: Path) -> list[Bytes | None]:
             codes.append(None)
             continue
 
-        image = np.ascontiguousarray(picture[:, :, ::-1])
+        image = np.asarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB), np.uint8)
         shows_place = descriptor.shows_place(image, None)
         codes.append(descriptor.code(features.features(image)) if shows_place else None)
 

@@ -1,9 +1,9 @@
-"""How similar views of different places are by chance, estimated from all comparisons so far, and
-how far beyond that a similarity is.
+"""How similar views of different places are by chance, and how far beyond that a similarity is.
 
-No threshold of similarity fits two cameras or two lights: the same place by day and by night is
-less alike than two places in one light. So each remembered view is compared with what it usually
-has in common with others, and each new view with what it has in common with all remembered ones.
+No threshold of similarity fits two cameras or two lights: one place by day and by night is less
+alike than two places in one light. So each view is judged by its own similarities to all that is
+remembered, nearly all of which are of other places. The more there are, the more the best of them
+stands out by chance: that is estimated of the views that matched nothing.
 """
 
 from __future__ import annotations
@@ -12,61 +12,58 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 
-# A remembered view's mean and variance follow the last so many comparisons, and begin as if there
-# had been PRIOR_VIEWS with the usual variance around a mean of 0, which standardized vectors have.
-COMPARED_VIEWS = 60
+# The variance that is usual counts as much as so many remembered views: of a few views it is as
+# good as unknown.
 PRIOR_VIEWS = 20
-# The usual variance, before there were comparisons, and how many they last: that of vectors of some
-# hundred independent values.
+# Before there were comparisons, that of vectors of some hundred independent values; later the mean
+# over the last so many views.
 PRIOR_VARIANCE = 0.08**2
 USUAL_VIEWS = 200
+# A similarity is compared with those to so many views remembered around it: of about one drive, in
+# one light.
+WINDOW_VIEWS = 120
+# The best score of a view of a new place, before there were any, how many views it follows, and how
+# much one may count beyond it: places that are known, but not recognized yet, have far higher ones.
+PRIOR_BEST = 2.0
+BEST_VIEWS = 100
+MOST_BEYOND = 0.5
 
 
 class Chance:
-    """Running statistics of the similarities to each remembered view, the oldest first."""
+    """The usual variance of similarities, and `best`, the usual best score of a view of a new
+    place, as of the comparisons so far.
+    """
 
     def __init__(self) -> None:
-        self._mean = np.empty(0)
-        self._variance = np.empty(0)
-        self._count = np.empty(0)
-        self._usual_variance = PRIOR_VARIANCE
-        self._compared = 0
+        self._variance = PRIOR_VARIANCE
+        self._views = 0
+        self.best = PRIOR_BEST
+
+    def add_best(self, score: float) -> None:
+        """Count the best score of a view that matches nothing."""
+        self.best += (min(score, self.best + MOST_BEYOND) - self.best) / BEST_VIEWS
 
     def scores(self, similarities: Floats) -> Floats:
-        """Return how many standard deviations the similarity to each of the oldest remembered views
-        is over that of different places, and count it.
+        """Return how many standard deviations each similarity of a view, to the remembered ones in
+        their order, is over those to different places, and count them.
         """
         count = len(similarities)
         if not count:
             return np.empty(0)
 
-        mean = self._mean[:count]
-        variance = self._variance[:count]
-        beyond = similarities - mean
+        # The window around each view, which ends where memory ends.
+        width = min(count, WINDOW_VIEWS)
+        first = np.clip(np.arange(count) - width // 2, 0, count - width)
+        sums = np.concatenate([[0.0], np.cumsum(similarities)])
+        squares = np.concatenate([[0.0], np.cumsum(similarities**2)])
+        mean = (sums[first + width] - sums[first]) / width
+        square = (squares[first + width] - squares[first]) / width
 
-        # Of a few views the mean is as good as unknown; so is their variance.
-        known = count / (count + PRIOR_VIEWS)
-        excess = beyond - known * beyond.mean()
-        of_view = known * np.mean(excess**2) + (1 - known) * self._usual_variance
-        scores = excess / np.sqrt((of_view + variance) / 2)
+        known = width / (width + PRIOR_VIEWS)
+        expected = known * mean
+        found = square - 2 * expected * mean + expected**2
+        variance = known * np.maximum(found, 0) + (1 - known) * self._variance
 
-        self._count[:count] += 1
-        comparisons = np.minimum(PRIOR_VIEWS + self._count[:count], COMPARED_VIEWS)
-        mean += beyond / comparisons
-        variance += (excess**2 - variance) / comparisons
-        self._compared += 1
-        usual_views = PRIOR_VIEWS + min(self._compared, USUAL_VIEWS)
-        self._usual_variance += (float(np.mean(excess**2)) - self._usual_variance) / usual_views
-        return np.asarray(scores)
-
-    def remember(self, count: int) -> None:
-        """Begin to estimate for `count` more views."""
-        self._mean = np.concatenate([self._mean, np.zeros(count)])
-        self._variance = np.concatenate([self._variance, np.full(count, self._usual_variance)])
-        self._count = np.concatenate([self._count, np.zeros(count)])
-
-    def forget(self, count: int) -> None:
-        """Forget the `count` oldest views."""
-        self._mean = self._mean[count:]
-        self._variance = self._variance[count:]
-        self._count = self._count[count:]
+        self._views = min(self._views + 1, USUAL_VIEWS)
+        self._variance += (float(found.mean()) - self._variance) / (PRIOR_VIEWS + self._views)
+        return np.asarray((similarities - expected) / np.sqrt(variance))

@@ -12,10 +12,11 @@ import numpy as np
 from cogmap.geometry.arrays import Bytes, Singles
 from cogmap.services.epam.backbone import CHANNELS, COLUMNS, ROWS
 
-# A patch's sides in features: an offset of a step aside, or a turn by some degrees, moves most of
-# what is in a patch within it.
-PATCH = 2
-PATCHES = (ROWS // PATCH) * (COLUMNS // PATCH)
+# The first rows and columns of patches, in features. A quarter of the view's width: a step aside,
+# or a turn by some degrees, moves most of what is in a patch within it.
+FIRST_ROWS = (0, 3, 5)
+FIRST_COLUMNS = (0, 2, 5, 8)
+PATCHES = len(FIRST_ROWS) * len(FIRST_COLUMNS)
 CODE_BYTES = CHANNELS * PATCHES
 # Steps of a code for a standard deviation of a feature: a byte holds four to either side.
 LEVELS = 32.0
@@ -30,8 +31,12 @@ MIN_NEAR_SHARE = 0.06
 
 def code(features: Singles) -> Bytes:
     """Return the code, uint8 (CODE_BYTES,), of features (CHANNELS, ROWS, COLUMNS)."""
-    patches = features.reshape(CHANNELS, ROWS // PATCH, PATCH, COLUMNS // PATCH, PATCH)
-    levels = np.rint(MIDDLE + LEVELS * patches.mean((2, 4)))
+    by_row = np.add.reduceat(features, FIRST_ROWS, axis=1)
+    sums = np.add.reduceat(by_row, FIRST_COLUMNS, axis=2)
+    heights = np.diff((*FIRST_ROWS, ROWS))
+    widths = np.diff((*FIRST_COLUMNS, COLUMNS))
+    means = sums / np.outer(heights, widths)
+    levels = np.rint(MIDDLE + LEVELS * means)
     return np.asarray(np.clip(levels, 0, 255).astype(np.uint8).reshape(CODE_BYTES))
 
 

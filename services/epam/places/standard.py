@@ -15,9 +15,9 @@ from cogmap.services.epam.backbone import CHANNELS
 from cogmap.services.epam.places.descriptor import CODE_BYTES, LEVELS, MIDDLE, PATCHES
 
 # Of views: how long the mean remembers, and the covariance, which needs more of them. Half a
-# minute to two minutes of driving, so that they follow the light.
-MEAN_VIEWS = 60
-COVARIANCE_VIEWS = 180
+# minute of driving and more, so that they follow the light.
+MEAN_VIEWS = 40
+COVARIANCE_VIEWS = 120
 # The mean of the backbone's photographs, and the variance that averages over patches have there,
 # count as much as so many views.
 PRIOR_MEAN_VIEWS = 10

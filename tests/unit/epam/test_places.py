@@ -109,7 +109,7 @@ def _recognizer_after(route: Route) -> PlaceRecognizer:
 def test_a_route_is_recognized_in_other_light_at_other_speed_and_heading() -> None:
     route = _route(1)
     recognizer = _recognizer_after(route)
-    places = np.arange(0, LENGTH - 30, 1.4)
+    places = np.arange(0, LENGTH - 15, 1.4)
     evening = [route.code(place, 10, evening=True) for place in places]
 
     matches, _ = _drive(recognizer, evening, LENGTH)
@@ -120,7 +120,7 @@ def test_a_route_is_recognized_in_other_light_at_other_speed_and_heading() -> No
             assert match.score >= 0.9
             assert match.view_ns == PERIOD_NS * match.frame
             errors.append(abs(match.frame - place))
-    assert len(errors) >= 0.8 * len(places)
+    assert len(errors) >= 0.7 * len(places)
     assert max(errors) <= 2.0
 
 
@@ -133,6 +133,19 @@ def test_on_a_new_route_nothing_matches_and_every_view_is_remembered() -> None:
 
     assert not any(matches)
     assert frames == list(range(LENGTH, 2 * LENGTH))
+
+
+def test_a_route_that_is_approached_from_its_other_end_matches_nothing() -> None:
+    route = _route(1)
+    recognizer = _recognizer_after(route)
+    mirrored = [
+        _code(np.ascontiguousarray(route.view(place)[:, ::-1]))
+        for place in range(LENGTH - 1, 0, -1)
+    ]
+
+    matches, _ = _drive(recognizer, mirrored, LENGTH)
+
+    assert not any(matches)
 
 
 def test_a_single_view_is_no_match() -> None:
@@ -163,7 +176,7 @@ def test_a_recognized_place_is_not_remembered_again() -> None:
 
     unrecognized = [match for match in matches if match is None]
     assert len(remembered) == len(unrecognized)
-    assert len(unrecognized) <= 6
+    assert len(unrecognized) <= 10
 
 
 def test_a_robot_at_rest_remembers_one_view() -> None:
@@ -182,7 +195,7 @@ def test_a_robot_at_rest_remembers_one_view() -> None:
 def test_at_rest_the_last_match_is_returned_again() -> None:
     route = _route(1)
     recognizer = _recognizer_after(route)
-    until_rest = _along(route, (5, 6, 7, 8, 9, 10, 10, 10))
+    until_rest = _along(route, [*range(12), 11, 11])
 
     matches, _ = _drive(recognizer, until_rest, LENGTH)
 
@@ -233,8 +246,8 @@ def test_views_remembered_before_a_restart_are_recognized_after_it() -> None:
 
     again = [route.code(place, evening=True) for place in range(30)]
     matches, _ = _drive(restarted, again, LENGTH)
-    frames = [match.frame for match in matches[5:] if match]
-    assert frames == list(range(5, 30))
+    frames = [match.frame for match in matches[10:] if match]
+    assert frames == list(range(10, 30))
 
 
 def test_at_rest_after_a_restart_no_view_is_remembered_again() -> None:
@@ -281,5 +294,5 @@ def test_the_same_views_give_the_same_answers() -> None:
 def test_a_code_of_another_type_or_size_is_refused(wrong: npt.NDArray[np.generic]) -> None:
     view = RememberedView(frame=5, view_ns=5, code=Array.of(wrong))
 
-    with pytest.raises(MessageError, match="remembered view 5: expected a uint8 code of 1600"):
+    with pytest.raises(MessageError, match="remembered view 5: expected a uint8 code of 960"):
         PlaceRecognizer().restore([view])
