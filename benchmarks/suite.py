@@ -17,8 +17,10 @@ from benchmarks.bus import measure as bus
 from benchmarks.cognition import measure as cognition
 from benchmarks.cycle import measure as cycle
 from benchmarks.explore import measure as explore
+from benchmarks.individuals import measure as individuals
 from benchmarks.learning import measure as learning
 from benchmarks.lifelong import measure as lifelong
+from benchmarks.localization import beacons, trees, without_names
 from benchmarks.localization import measure as localization
 from benchmarks.map_correction import false_groups
 from benchmarks.map_correction import measure as map_correction
@@ -90,6 +92,29 @@ SUITE = (
         localization.measure,
         options=localization.OPTIONS,
         data={"folder": "mrclam6"},
+        option_thresholds=localization.OPTION_THRESHOLDS,
+    ),
+    Benchmark(
+        "without-names",
+        without_names.THRESHOLDS,
+        localization.measure,
+        data={"folder": "mrclam6"},
+        arguments={"is_without_names": True},
+        has_command=False,
+    ),
+    Benchmark(
+        "trees",
+        trees.THRESHOLDS,
+        localization.measure,
+        data={"trees": "victoria_park"},
+        has_command=False,
+    ),
+    Benchmark(
+        "ranges",
+        beacons.THRESHOLDS,
+        localization.measure,
+        data={"ranges": "plaza1"},
+        has_command=False,
     ),
     Benchmark(
         "map_correction",
@@ -124,6 +149,9 @@ SUITE = (
         has_command=False,
     ),
     Benchmark("explore", explore.THRESHOLDS, explore.measure, options=explore.OPTIONS),
+    Benchmark(
+        "individuals", individuals.THRESHOLDS, individuals.measure, options=individuals.OPTIONS
+    ),
     Benchmark("cognition", cognition.THRESHOLDS, cognition.measure, options=[PROCESSES]),
     Benchmark("memory", memory.THRESHOLDS, memory.measure, options=[PROCESSES]),
     Benchmark("learning", learning.THRESHOLDS, learning.measure, options=[PROCESSES]),

@@ -27,6 +27,7 @@ VERBS = {
         "Show, check, export and import long-term memory.",
     ),
     "module": ("cogmap.cli.processes:module", "Run one module as this process."),
+    "name": ("cogmap.cli.name:name", "Name an object of the agent's map, or list them."),
     "new": ("cogmap.cli.new.command:new", "Write a new codelet or module to begin with."),
     "router": ("cogmap.cli.processes:router", "Run the router that all modules connect to."),
     "run": ("cogmap.cli.run.command:run", "Drive through a simulated town, or play a recording."),

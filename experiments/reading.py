@@ -16,7 +16,6 @@ from cogmap.schemas.nodes import (
     Observations,
     PathSegment,
     PlaceColumn,
-    object_id,
 )
 from cogmap.services.codelets.mapping.observations import Sightings
 
@@ -41,16 +40,25 @@ def path_rows(graph: Graph) -> Floats:
     return rows_of(graph.of_kind(PathSegment))
 
 
-def object_positions_m(graph: Graph, labels: Sequence[str]) -> Floats:
-    """Return where the objects of these labels stand, (n, 2); NaN for one not on the map."""
-    positions_m = np.full((len(labels), 2), np.nan)
+def object_positions_m(graph: Graph, names: Sequence[str]) -> Floats:
+    """Return where the objects of these names stand, (n, 2), of several of one name the one that
+    was seen most often; NaN for one not on the map.
+    """
+    positions_m = np.full((len(names), 2), np.nan)
+    found = objects_by_name(graph)
 
-    for row, label in enumerate(labels):
-        node = graph.get(Object, object_id(label))
+    for row, name in enumerate(names):
+        node = found.get(name)
         if node is not None:
             positions_m[row] = (node.x_m, node.y_m)
 
     return positions_m
+
+
+def objects_by_name(graph: Graph) -> dict[str, Object]:
+    """Return the objects by name, of several of one name the one that was seen most often."""
+    by_sightings = sorted(graph.of_kind(Object), key=lambda node: node.sightings)
+    return {node.name: node for node in by_sightings}
 
 
 def observations(graph: Graph) -> Sightings:

@@ -69,10 +69,10 @@ Event = Replay | RouteReplay
 class Relation(Part, kw_only=True, frozen=True):
     """Where an object stands as seen from the agent: egocentric, left positive.
 
-    `look` is what perception calls it.
+    `look` is the name of what it looks like, empty if perception has none for it.
     """
 
-    look: Name
+    look: str = ""
     range_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
     bearing_rad: Finite
 

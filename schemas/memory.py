@@ -14,20 +14,24 @@ from cogmap.schemas.nodes.recollection import TileNumber, check_tree
 
 
 class StoredObjects(Part, kw_only=True, frozen=True, tag="objects"):
-    """The objects of a map: their labels and functions, and their positions and sizes in `objects`,
-    float64 (n, 7), see RecalledColumn, in the map's own frame.
+    """The objects of a map: their labels, what perception and people call them, and functions, and
+    their positions and sizes in `objects`, float64 (n, 7), see RecalledColumn, in the map's own
+    frame.
     """
 
     map: Name
     cell_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
     labels: list[Name]
+    names: list[str]
+    given_names: list[str]
     functions: list[str]
     objects: Matrix
 
     def __post_init__(self) -> None:
         check_matrix(self.map, self.objects, "<f8", (len(RecalledColumn),))
         count, _ = self.objects.shape
-        if len(self.labels) != count or len(self.functions) != count:
+        columns = (self.labels, self.names, self.given_names, self.functions)
+        if {len(column) for column in columns} != {count}:
             raise ValueError(f"{self.map}: {count} objects, and other numbers of their names")
 
     @property

@@ -95,19 +95,39 @@ class RangeScan(Message, kw_only=True, frozen=True):
     range_m: Array
 
 
-class Percept(Part, kw_only=True, frozen=True):
-    """One recognised object: a PAM node over threshold, and where it stands as seen from the robot.
+class Appearance(Part, kw_only=True, frozen=True):
+    """What an object looks like from one side: a direction, float32 (n,) of length 1.
 
-    `activation` is the total activation of the PAM node; `evidence` is how likely the view alone
-    makes it, whatever was expected. Bearing (left positive) and range point to the object's
-    estimated centre; `whole` says that neither image border nor another object cuts it. `box_px` is
-    left, top, width, height in the view; `outline_px` are the corners, column and row, of a polygon
-    around what is seen of it.
+    The more alike two directions are, the likelier both are of one object: the logarithm of that,
+    over any other object, is `sharpness` times what their cosine has over `even_cosine`.
+    """
+
+    direction: Array
+    sharpness: Annotated[float, msgspec.Meta(gt=0, le=1e3)]
+    even_cosine: Annotated[float, msgspec.Meta(ge=-1, le=1)]
+
+
+class Percept(Part, kw_only=True, frozen=True):
+    """Something that is seen: what it may be called, what it looks like, and where it stands as
+    seen from the robot.
+
+    `name` is the likeliest name, empty if it has none, as a tree trunk; `activation` is the total
+    activation of its PAM node, `evidence` how likely the view alone makes it, whatever was
+    expected, and `names` how likely it makes other names. `label` is that of the individual object
+    that it is of, and `certainty` how likely it is of that one: the workspace finds it, unless what
+    perceives knows it, as by a barcode.
+    Bearing (left positive) and range point to the object's estimated centre; `whole` says that
+    neither image border nor another object cuts it. `box_px` is left, top, width, height in the
+    view; `outline_px` are the corners, column and row, of a polygon around what is seen of it.
     `function` is what it is used for, as far as what it was recognised as implies that. `feelings`
     are those that the PAM node activates, each with its activation.
     """
 
-    label: Name
+    name: str = ""
+    names: dict[Name, Unit] = {}
+    label: str = ""
+    appearance: Appearance | None = None
+    certainty: Unit = 1.0
     activation: Unit
     evidence: Unit
     bearing_rad: Finite
@@ -168,15 +188,6 @@ class Percepts(Message, kw_only=True, frozen=True):
     matches: list[PlaceMatch] = []
 
 
-class LearnedObject(Part, kw_only=True, frozen=True):
-    """A PAM node that one encounter gave: its label, and what the object looks like, float32 (n,)
-    of length 1.
-    """
-
-    label: Name
-    embedding: Array
-
-
 class RememberedView(Part, kw_only=True, frozen=True):
     """A view to recognise a place by: its `frame` and stamp, and `code`, uint8 (n,), for EPAM to
     compare.
@@ -210,7 +221,6 @@ class Learned(Message, kw_only=True, frozen=True):
     """
 
     frame: Count
-    objects: list[LearnedObject] = []
     views: list[RememberedView] = []
     associations: Associations | None = None
 

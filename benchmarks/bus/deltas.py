@@ -33,7 +33,7 @@ COST_REPEATS = 5
 RAW_KEY = "benchmark/raw"
 NODES = 50
 LINKS = 200
-SAMPLES = 444
+SAMPLES = 358
 SEED = 31
 LINK_KIND = "near"
 

@@ -36,7 +36,6 @@ from cogmap.schemas.nodes import (
     Object,
     Plan,
     goal_id,
-    look_of,
     place_cell,
 )
 from cogmap.schemas.sensing import StreetClosure, TruePose
@@ -180,7 +179,7 @@ class Judge(TownObserver):
             plot = self._place.plots[number]
             for node in self.graph.of_kind(Object):
                 away_m = math.dist(self._in_truth(node.x_m, node.y_m), (plot.x_m, plot.y_m))
-                if look_of(node.label) == plot.kind.name and away_m <= SAME_M:
+                if node.name == plot.kind.name and away_m <= SAME_M:
                     self._buildings[number] = Surprise((plot.x_m, plot.y_m))
                     self._goals.append(node.label)
                     break
@@ -193,7 +192,7 @@ class Judge(TownObserver):
         for node in broadcast.coalition.nodes:
             if isinstance(node, Object):
                 at_m = self._in_truth(node.x_m, node.y_m)
-                kind = look_of(node.label)
+                kind = node.name
                 gone = [
                     surprise
                     for number, surprise in self._buildings.items()

@@ -26,7 +26,6 @@ from cogmap.schemas.sensing import Percept, Percepts, Pose, View
 from cogmap.services import registry
 from cogmap.services.epam.public import function_of
 from cogmap.services.sim.public import CATALOGUE, town
-from cogmap.services.workspace.public import RECOGNITION_THRESHOLD
 
 TOWNS = 4
 # After the towns of `python -m benchmarks perception`.
@@ -39,8 +38,8 @@ FOG_REACH_M = 40.0
 FOG_GREY = 190.0
 NOISE_SD = 4.0
 PERIOD_S = 0.4
-SURE = RECOGNITION_THRESHOLD
-"""With less evidence a view is ambiguous, and is not mapped by."""
+SURE = 0.7
+"""With less evidence for its name a view is ambiguous. LIDA: the threshold of percepts."""
 TRAINED = frozenset(kind.name for kind in CATALOGUE)
 
 
@@ -132,9 +131,12 @@ def _broadcast(view: View, conscious: Sequence[Percept]) -> Broadcast:
     nodes = []
     relations = {}
     for percept in conscious:
-        label = percept.label
+        label = percept.name
         name = object_id(label)
-        nodes.append(Object(id=name, label=label, x_m=0.0, y_m=0.0, function=function_of(label)))
+        names = {label: 1.0}
+        nodes.append(
+            Object(id=name, label=label, names=names, x_m=0.0, y_m=0.0, function=function_of(label))
+        )
         relations[name] = Relation(
             look=label, range_m=percept.range_m, bearing_rad=percept.bearing_rad
         )

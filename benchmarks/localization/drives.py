@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from benchmarks.report import Metrics
 from cogmap.data.mrclam import Robot
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose, relative
+from cogmap.parallel import Progress
 
 SEEDS = (0, 1)
 ORIGIN = (0.0, 0.0, 0.0)
@@ -28,13 +29,15 @@ class Drive(NamedTuple):
     """The estimates on a drive: (n, 3) poses `online` and by path integration at each moment.
 
     `path` (m, 7) is the path on the map in the end: stamp_s, pose, pose by path integration.
-    `late_answers` is how many answers of background codelets came too late to be committed.
+    `late_answers` is how many answers of background codelets came too late to be committed;
+    `individuals` how many objects the map has in the end that were seen more than once.
     """
 
     online: Floats
     odometry: Floats
     path: Floats
     late_answers: int
+    individuals: int
 
     def corrected(self, stamps_s: Floats) -> Floats:
         """Return (n, 3) poses at the moments as the map has them in the end.
@@ -55,28 +58,33 @@ class Drive(NamedTuple):
 
 
 def follow(
-    log: Iterable[Moment],
+    log: Sequence[Moment],
     surveyed: dict[int, tuple[float, float]],
     start: tuple[float, float, float],
     seed: int,
+    *,
+    settings: Mapping[str, object] | None = None,
+    progress: Progress = lambda share: None,
 ) -> Drive:
     """Run a log through the workspace and a worker, from `start`, on a map of `surveyed` landmarks.
 
-    Without any it makes a map of its own.
+    Without any it makes a map of its own. `settings` are those of LocalizationLoop.
     """
     landmarks: Landmarks = {label_of(subject): where for subject, where in surveyed.items()}
-    loop = LocalizationLoop(start, landmarks, surveyed=bool(landmarks), seed=seed)
+    loop = LocalizationLoop(start, landmarks, bool(landmarks), seed, settings)
     poses = []
     odometry = []
 
-    for moment in log:
+    for number, moment in enumerate(log):
         loop.live(moment)
+        progress(number / len(log))
         poses.append(loop.pose)
         odometry.append(loop.odometry)
 
     path = loop.path
+    individuals = loop.individuals
     loop.close()
-    return Drive(np.array(poses), np.array(odometry), path, loop.late_answers)
+    return Drive(np.array(poses), np.array(odometry), path, loop.late_answers, individuals)
 
 
 def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics:

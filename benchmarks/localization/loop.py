@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from typing import cast
 
 import numpy as np
@@ -56,9 +57,11 @@ LATE = " is late: "
 Landmarks = dict[str, tuple[float, float]]
 
 
-def sections(surveyed: bool) -> Sections:
-    """Configure both modules; no loop is closed on a map that was surveyed."""
-    codelets = {
+def sections(surveyed: bool, settings: Mapping[str, object]) -> Sections:
+    """Configure both modules, the codelets with `settings` of a robot besides; no loop is closed on
+    a map that was surveyed.
+    """
+    codelets: dict[str, object] = {
         "samples": SAMPLES,
         "kept_samples": 100,
         "landmark_samples": 1000,
@@ -78,6 +81,7 @@ def sections(surveyed: bool) -> Sections:
         # The whole path is evaluated.
         "sparse_after_s": NEVER_S,
     }
+    codelets |= settings
 
     if surveyed:
         codelets["revisit_s"] = NEVER_S
@@ -116,6 +120,7 @@ def initial_map(start: Pose, landmarks: Landmarks, surveyed: bool, cycle: int) -
             base_level=1.0,
             cycle=cycle,
             label=label,
+            names={label: 1.0},
             x_m=x_m,
             y_m=y_m,
             surveyed=surveyed,
@@ -132,7 +137,8 @@ class LocalizationLoop:
 
     `task_s` has each task of the last cycle: its codelet, and the CPU time that the worker took.
     `late_answers` counts the answers of background codelets that came after what they would change
-    had changed: the workspace rejects these in every drive.
+    had changed: the workspace rejects these in every drive. `settings` are those of the codelets in
+    which the robot differs from MRCLAM's.
     """
 
     def __init__(
@@ -141,6 +147,7 @@ class LocalizationLoop:
         landmarks: Landmarks | None = None,
         surveyed: bool = False,
         seed: int = 0,
+        settings: Mapping[str, object] | None = None,
     ) -> None:
         self.task_s: list[tuple[str, float]] = []
         self._graph = Graph()
@@ -149,7 +156,7 @@ class LocalizationLoop:
         self._frame = 0
         self._until_ns = 0
 
-        configured = sections(surveyed)
+        configured = sections(surveyed, settings or {})
         workspace = registry.build("workspace", configured)
         if workspace.restore is not None:
             first_cycle = seed * CYCLES_A_SEED
@@ -205,6 +212,11 @@ class LocalizationLoop:
     def odometry(self) -> Floats:
         """Return the agent's pose (3,) by path integration alone."""
         return self._agent.odometry.pose()
+
+    @property
+    def individuals(self) -> int:
+        """Return how many objects the map has that were seen more than once."""
+        return sum(node.sightings > 1 for node in self._graph.of_kind(Object))
 
     @property
     def path(self) -> Floats:

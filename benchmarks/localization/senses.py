@@ -42,6 +42,7 @@ def label_of(subject: int) -> str:
 def seen(label: str, bearing_rad: float, range_m: float) -> Percept:
     """Make a percept with the benchmark's noise: 3 % of the distance, as the paper's, and 1°."""
     return Percept(
+        name=label,
         label=label,
         activation=1.0,
         evidence=1.0,

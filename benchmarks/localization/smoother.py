@@ -56,7 +56,7 @@ class Problem:
         self._count += 1
         here = self._key(self._count)
 
-        step, sd = _step(moment.motions)
+        step, sd = step_of(moment.motions)
         motion = self._gtsam.Pose2(*step)
         noise = self._gtsam.noiseModel.Diagonal.Sigmas(sd)
         factor = self._gtsam.BetweenFactorPose2(before, here, motion, noise)
@@ -71,7 +71,7 @@ class Problem:
             cauchy = models.mEstimator.Cauchy.Create(CAUCHY)
             robust = models.Robust.Create(cauchy, models.Diagonal.Sigmas(sds))
 
-            _, _, number = percept.label.rpartition("-")
+            _, _, number = percept.name.rpartition("-")
             landmark = self._gtsam.symbol("l", int(number))
             bearing = self._gtsam.Rot2(percept.bearing_rad)
             range_m = percept.range_m
@@ -95,7 +95,7 @@ class Problem:
         return key
 
 
-def _step(rows: Floats) -> tuple[Floats, Floats]:
+def step_of(rows: Floats) -> tuple[Floats, Floats]:
     """Compute the pose that (n, 5) rows of motion lead to from 0, and its standard deviations."""
     speed, turn_rate, dt, speed_sd, turn_rate_sd = rows.T
     turn_rad = turn_rate * dt

@@ -56,10 +56,18 @@ class Walk(NamedTuple):
         """Return the houses known once so much was driven."""
         nodes = []
         for number in np.flatnonzero(self.after_m <= driven_m).tolist():
-            label = individual_label(self.looks[number], 1 + number)
+            label = individual_label(1 + number, 0)
+            names = {self.looks[number]: 1.0}
             x_m, y_m = self.at_m[number].tolist()
             nodes.append(
-                Object(id=object_id(label), label=label, x_m=x_m, y_m=y_m, sightings=SIGHTINGS)
+                Object(
+                    id=object_id(label),
+                    label=label,
+                    names=names,
+                    x_m=x_m,
+                    y_m=y_m,
+                    sightings=SIGHTINGS,
+                )
             )
 
         return nodes
@@ -178,9 +186,15 @@ def _learned(name: str, walk: Walk) -> RememberedMap:
     """Return the map that a walk stored."""
     rows = np.zeros((len(walk.looks), 7))
     rows[:, :2] = walk.at_m
-    labels = [node.label for node in walk.objects(len(walk.way_m))]
+    houses = walk.objects(len(walk.way_m))
     known = StoredObjects(
-        map=name, cell_m=1.0, labels=labels, functions=[""] * len(labels), objects=Matrix.of(rows)
+        map=name,
+        cell_m=1.0,
+        labels=[node.label for node in houses],
+        names=[node.look for node in houses],
+        given_names=[""] * len(houses),
+        functions=[""] * len(houses),
+        objects=Matrix.of(rows),
     )
     squares = np.floor(walk.way_m / TILE_SIDE).astype(np.int64)
     return RememberedMap(name, known, tiles={(x, y): {} for x, y in squares.tolist()})

@@ -6,10 +6,20 @@ import math
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 
+import msgspec
+import numpy as np
+
 from benchmarks.perception.objects import Sight
 from benchmarks.perception.scenes import MIN_TURN_RAD, other_distance
 from cogmap.geometry.arrays import Floats
-from cogmap.services.workspace.public import RECOGNITION_THRESHOLD
+from cogmap.graph.likeness import odds
+from cogmap.schemas.sensing import Appearance, Percept
+
+MIN_MET_SHARE = 0.15
+"""The share of a view's pixels that a building covers, by its box, when it is met."""
+
+SURE = 0.7
+"""With less activation a building is not taken for known. LIDA: the threshold of percepts."""
 
 
 @dataclass(frozen=True)
@@ -44,6 +54,51 @@ class Memory:
         return Memory(*map(sum, zip(astuple(self), astuple(other), strict=True)))
 
 
+class Strangers:
+    """Buildings without a name, told apart by their appearance alone: the first encounter with each
+    gives it a name.
+    """
+
+    def __init__(self) -> None:
+        self._met: list[tuple[str, Appearance]] = []
+
+    def named(self, percepts: Sequence[Percept], pixels: int) -> list[Percept]:
+        """Name those percepts of a view of so many pixels that perception has no name for.
+
+        One that looks like none that was met is met now if it is well visible: whole, and large.
+        """
+        found = []
+        for percept in percepts:
+            name, likeness = self._most_alike(percept)
+            _, _, width_px, height_px = percept.box_px
+            is_visible = percept.whole and width_px * height_px >= MIN_MET_SHARE * pixels
+            if percept.name or percept.appearance is None:
+                found.append(percept)
+            elif likeness > 1.0:
+                activation = likeness / (1.0 + likeness)
+                found.append(msgspec.structs.replace(percept, name=name, activation=activation))
+            elif is_visible:
+                name = f"stranger-{1 + len(self._met)}"
+                self._met.append((name, percept.appearance))
+                found.append(msgspec.structs.replace(percept, name=name, activation=1.0))
+            else:
+                found.append(percept)
+
+        return found
+
+    def _most_alike(self, percept: Percept) -> tuple[str, float]:
+        """Return who a percept looks like most, and how much likelier that is than of any other."""
+        best = ("", 0.0)
+        if percept.appearance is None:
+            return best
+
+        direction = np.asarray(percept.appearance.direction.numpy())
+        for name, known in self._met:
+            cosine = float(np.asarray(known.direction.numpy()) @ direction)
+            best = max(best, (name, odds(cosine, known)), key=lambda each: each[1])
+        return best
+
+
 def remembered(
     encounters: Sequence[Meeting], afterwards: Sequence[Meeting], trained: frozenset[str]
 ) -> Memory:
@@ -51,7 +106,7 @@ def remembered(
 
     Each was to be met in the encounter of its number. Sides and distances are other than in that
     one, and in every other encounter that it was seen in. Its name is the first that it was
-    recognised by, with an activation over RECOGNITION_THRESHOLD. A building that they gave no
+    recognised by, with an activation over SURE. A building that they gave no
     name, or that of a trained class or of another building, has none: no later sighting of it is
     right. Of later sightings all count, however low their activation.
     """
@@ -66,7 +121,7 @@ def remembered(
     for meeting in encounters:
         for number, label, activation in _sightings(meeting):
             places[number].append(meeting.from_where[number])
-            if number in names or activation <= RECOGNITION_THRESHOLD:
+            if number in names or activation <= SURE:
                 continue
 
             is_taken = label in names.values()

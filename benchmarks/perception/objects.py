@@ -89,7 +89,7 @@ def claims(percepts: Sequence[Percept], shape: tuple[int, ...]) -> list[Claim]:
     found = []
     for percept in percepts:
         pixels = filled(percept, shape)
-        found.append((percept.label, percept.activation, pixels))
+        found.append((percept.name, percept.activation, pixels))
 
     return found
 

@@ -9,8 +9,6 @@ from cogmap.geometry.arrays import Booleans, Bytes
 from cogmap.schemas.array import Array
 from cogmap.schemas.sensing import (
     Calibration,
-    Learned,
-    LearnedObject,
     Odometry,
     Percepts,
     StereoFrame,
@@ -31,11 +29,10 @@ PERIOD_S = 0.2
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """The view and percepts of one frame, the objects learned, and the time taken."""
+    """The view and percepts of one frame, and the time taken."""
 
     view: View
     percepts: Percepts
-    learned: list[LearnedObject]
     took_ms: float
 
 
@@ -71,9 +68,7 @@ class SensoryPipeline:
 
 
 class PerceptionPipeline:
-    """Sensory memory and EPAM, new: what they learn, they learn from the frames that they
-    `process`.
-    """
+    """Sensory memory and EPAM, new."""
 
     def __init__(self, calibration: Calibration) -> None:
         self._sensory = SensoryPipeline(calibration)
@@ -88,17 +83,12 @@ class PerceptionPipeline:
         recognised = self._epam.feed(view)
         took_ms = 1e3 * (time.perf_counter() - began_s)
 
-        learned = []
-        for message in recognised:
-            if isinstance(message, Learned):
-                learned += message.objects
-
         percepts = next(message for message in recognised if isinstance(message, Percepts))
-        return Result(view, percepts, learned, took_ms)
+        return Result(view, percepts, took_ms)
 
 
 class CandidateProbe:
-    """An extended PAM that gets the same views and learns the same.
+    """An extended PAM that gets the same views.
 
     It gives its candidates of any activation, which the running one does not publish.
     """
@@ -113,10 +103,9 @@ class CandidateProbe:
 
     def candidates(self, result: Result) -> list[tuple[str, float, Booleans]]:
         """Return the likeliest label, empty for none that it knows, its probability, and pixels
-        (h, w) of each, as they are before it learns from them.
+        (h, w) of each.
         """
         found = self._pam.candidates(view_arrays(result.view), result.view.calibration)
-        self._pam.restore(result.learned)
         candidates = []
 
         for candidate in found:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.perception import objects, road, sequence, streets
-from benchmarks.perception.novel import Meeting, Memory, remembered
+from benchmarks.perception.novel import Meeting, Memory, Strangers, remembered
 from benchmarks.perception.objects import Claim, Sight
 from benchmarks.perception.pipeline import PERIOD_S, CandidateProbe, PerceptionPipeline
 from benchmarks.perception.scenes import (
@@ -177,11 +177,13 @@ def measure_novel(seed: int, sightings: int) -> Memory:
     """Meet NOVEL invented buildings of a town, then see each up to `sightings` times."""
     with drawn(seed, KINDS, _first_and_again(sightings), NOVEL) as (place, camera, scenes):
         pipeline = PerceptionPipeline(camera)
+        strangers = Strangers()
         meetings = []
 
         for scene in scenes:
             result = pipeline.process(scene.left, scene.right)
-            percepts = objects.claims(result.percepts.objects, scene.label.shape)
+            named = strangers.named(result.percepts.objects, scene.label.size)
+            percepts = objects.claims(named, scene.label.shape)
             from_where = side_and_range(place, scene.pose)
             meetings.append(Meeting(_sight(percepts, place, scene), from_where))
 

@@ -32,7 +32,12 @@ AHEAD_RAD = math.radians(0.5)
 
 def spoken(name: str) -> str:
     """Write a label, a kind or the name of a scheme as people do."""
-    return name.replace("_", " ").replace("~", " ")
+    return name.replace("_", " ")
+
+
+def of_look(name: str) -> str:
+    """Write what perception calls something; what it has no name for is unknown."""
+    return spoken(name) if name else "unknown"
 
 
 def of_node(node: GraphNode) -> str:
@@ -42,7 +47,7 @@ def of_node(node: GraphNode) -> str:
             degrees = round(math.degrees(math.remainder(node.heading_rad, math.tau)))
             words = f"the agent at {_position(node.x_m, node.y_m)}, heading {degrees}°"
         case Object() | PerceptNode():
-            words = spoken(node.label)
+            words = spoken(node.name) if node.name else f"object {node.label}"
         case Goal():
             words = of_goal(node)
         case Plan():

@@ -130,7 +130,7 @@ def perceived(moment: Moment) -> Stage:
     percepts = moment.percepts.message
     rows = [Row((f"frame {percepts.frame}: {recognised(percepts)}",))]
     for percept in sorted(percepts.objects, key=lambda each: -each.activation):
-        label = names.spoken(percept.label)
+        label = names.of_look(percept.name)
         where = names.of_percept(percept)
         cells = (*_measured(percept.activation), label, where, names.of_feelings(percept))
         rows.append(Row(cells))

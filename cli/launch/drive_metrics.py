@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from cogmap.cli.launch.goals import unreached
-from cogmap.cli.launch.observer import Observer
+from cogmap.cli.launch.individuals.judge import (
+    RIGHT_M,
+    SEEN_VIEWS,
+    BuildingMetrics,
+    Judgement,
+    judge,
+)
 from cogmap.cli.launch.tally import EnergyMetrics, Tally
 from cogmap.errors import LogError
 from cogmap.geometry.arrays import Floats
@@ -89,9 +94,10 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     `forgotten` are the objects that left the map, having been seen too seldom. `gaps`: messages
     lost for good, by NEVER_DROP topic. `energy` is None where the robot's battery does not run
     down. `recalled` is the map of an earlier run that the agent has recalled, empty where it has
-    none, and `recalled_m` the distance that it had driven by then. `recording` is what was played,
-    empty where the drive was simulated: `views` of it, and `skipped`, which could not be read, the
-    last few of them for `skipped_reasons`.
+    none, and `recalled_m` the distance that it had driven by then. `buildings` is None where the
+    true buildings are not known. `recording` is what was played, empty where the drive was
+    simulated: `views` of it, and `skipped`, which could not be read; `skipped_reasons` say why the
+    last few could not, and what else is not played.
     """
 
     drive_s: float
@@ -116,8 +122,6 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     bus_share: float
     objects: int
     forgotten: list[str]
-    object_error_mean_m: float
-    object_error_median_m: float
     road_m2: float
     deltas: int
     dropped: int
@@ -131,6 +135,7 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     energy: EnergyMetrics | None = None
     recalled: str = ""
     recalled_m: float | None = None
+    buildings: BuildingMetrics | None = None
     recording: str = ""
     views: int = 0
     skipped: int = 0
@@ -175,24 +180,31 @@ def position_m(node: Object) -> tuple[float, float]:
     return node.x_m, node.y_m
 
 
-def object_errors_m(observer: Observer, graph: Graph) -> Floats:
-    """Measure how far each learned object is from the building of its name, (n,); one whose name no
-    building has does not count.
+def judged(tally: Tally) -> Judgement | None:
+    """Judge the buildings on the map by the true ones; None if these are not known."""
+    observer = tally.observer
+    if observer.town is None or not observer.town.buildings:
+        return None
+    return judge(tally.percepts, observer.town, tally.replica.graph, observer.to_world)
+
+
+def headline(metrics: DriveMetrics) -> str:
+    """Tell how many buildings stand on the map for how many that were seen, how many of them are
+    right, and how far they err.
     """
-    built = observer.town.buildings if observer.town else []
-    buildings = {building.name: building.pose for building in built}
+    found = metrics.buildings
+    if found is None:
+        return f"{metrics.objects} on the map; the true ones are not known"
+    if not found.seen:
+        return f"{metrics.objects} on the map; none was seen in {SEEN_VIEWS} views"
 
-    errors_m = []
-    for node in objects(graph):
-        true = buildings.get(node.label)
-        if true is None:
-            continue
-
-        learned_m = observer.to_world(np.array([position_m(node)]))
-        true_m = (true.x_m, true.y_m)
-        errors_m.append(math.dist(learned_m[0], true_m))
-
-    return np.array(errors_m)
+    told = f"{found.on_map} on the map for {found.seen} seen in {SEEN_VIEWS} views or more"
+    if found.error_median_m is None:
+        return told
+    return (
+        f"{told}; {found.right} of them right within {RIGHT_M:g} m, "
+        f"{found.error_median_m:.2f} m off in the median"
+    )
 
 
 def road_m2(graph: Graph) -> float:
@@ -215,7 +227,7 @@ def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) 
     observer = tally.observer
     graph = tally.replica.graph
     errors = observer.errors()
-    object_m = object_errors_m(observer, graph)
+    judgement = judged(tally)
     cycle_ms = tally.cycle_ms or [0.0]
     health = sorted(tally.health.items())
 
@@ -242,8 +254,6 @@ def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) 
         bus_share=sum(tally.bus_ms) / max(1e-9, sum(cycle_ms)),
         objects=len(objects(graph)),
         forgotten=list(tally.forgotten),
-        object_error_mean_m=float(object_m.mean()) if object_m.size else 0.0,
-        object_error_median_m=float(np.median(object_m)) if object_m.size else 0.0,
         road_m2=road_m2(graph),
         deltas=graph.version,
         dropped=tally.dropped,
@@ -257,6 +267,7 @@ def drive_metrics(tally: Tally, gaps: dict[str, int], rejected: dict[str, int]) 
         energy=tally.energy.metrics(),
         recalled=tally.observer.recalled,
         recalled_m=tally.observer.recalled_m,
+        buildings=None if judgement is None else judgement.metrics(),
         recording=observer.played.recording,
         views=observer.played.views,
         skipped=observer.played.skipped,

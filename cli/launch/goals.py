@@ -95,7 +95,8 @@ def nearest_label(goal: str, state: PlanState, graph: Graph) -> str:
         return ""
     node = graph.get(Goal, goal)
     label = node.object if node is not None else name_of(goal)
-    return nearest(label, [each.label for each in graph.of_kind(Object)])
+    known = [each.name or each.label for each in graph.of_kind(Object)]
+    return nearest(label, sorted(set(known)))
 
 
 def _reason(goal: Goal, plan: Plan | None, graph: Graph) -> str:

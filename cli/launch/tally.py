@@ -12,6 +12,7 @@ import msgspec
 
 from cogmap.bus.codec import Envelope
 from cogmap.bus.interface import Arrival
+from cogmap.cli.launch.individuals.percepts import PerceptTally
 from cogmap.cli.launch.observer import OBSERVED, Observer
 from cogmap.errors import MessageError
 from cogmap.graph.replica import Replica
@@ -28,6 +29,7 @@ from cogmap.schemas.topics import Delivery
 MAX_REASONS = 8
 FOLLOWED = (
     *OBSERVED,
+    topics.PERCEPTS,
     topics.ENERGY,
     topics.MOTOR_COMMAND,
     topics.BROADCAST,
@@ -94,13 +96,14 @@ class Tally:
     `cycle_ms`: of each command, the time from the stamping of its camera frame until it was
     received; `bus_ms`: the part of it spent in anything but computing. `refused`: why the last few
     answers of codelets were dropped. `forgotten`: the labels of objects that left the map as their
-    activation had decayed. `halted` and `slowed`: how many commands stopped the robot or kept it
-    below its cruising speed, by reason; `command` is the newest. `energy` is what the body sensed
-    of it.
+    activation had decayed. `percepts` has them all, and what each was given to. `halted` and
+    `slowed`: how many commands stopped the robot or kept it below its cruising speed, by reason;
+    `command` is the newest. `energy` is what the body sensed of it.
     """
 
     def __init__(self, replica: Replica) -> None:
         self.observer = Observer()
+        self.percepts = PerceptTally()
         self.replica = replica
         self.cycle_ms: list[float] = []
         self.bus_ms: list[float] = []
@@ -128,6 +131,7 @@ class Tally:
     def update(self, message: Message, envelope: Envelope, received_ns: int) -> None:
         """Take account of one message. Raises MessageError if it is not what its topic carries."""
         self.observer.update(message)
+        self.percepts.update(message)
         match message:
             case Delta():
                 self.dropped += message.rejected
@@ -136,7 +140,7 @@ class Tally:
                     if isinstance(operation, DropNode):
                         node = self.replica.graph.get(Object, operation.id)  # it is there still
                         if node is not None:
-                            self.forgotten.append(node.label)
+                            self.forgotten.append(node.name or node.label)
                 self.replica.follow(message)
             case Health():
                 self.health[message.instance] = message

@@ -205,7 +205,7 @@ def _report(
     as_json: bool,
 ) -> None:
     """Print the name of the file that was written, and what it shows."""
-    objects = None if recognised is None else [each.label for each in recognised.objects]
+    objects = None if recognised is None else [each.name for each in recognised.objects]
     if as_json:
         number = frame.number
         print_json(Picture(str(path), topic.name, number, frame.stamp_ns, frame.at_s, objects))

@@ -11,7 +11,12 @@ from rich.console import Console
 
 from cogmap.bus.interface import Arrival
 from cogmap.cli.files import check_picture
-from cogmap.cli.launch.drive_metrics import RecordedMetrics, Recording, drive_metrics
+from cogmap.cli.launch.drive_metrics import (
+    RecordedMetrics,
+    Recording,
+    drive_metrics,
+    headline,
+)
 from cogmap.cli.launch.tally import FOLLOWED, Tally
 from cogmap.cli.log.inspect import log_argument
 from cogmap.cli.options import json_option
@@ -74,12 +79,10 @@ def draw_map(log: Path, output: Path | None) -> None:
 
     logging.getLogger("matplotlib").setLevel(logging.WARNING)
     try:
-        plot.draw(path, tally.observer, tally.replica.graph, metrics)
+        plot.draw(path, tally, metrics)
     except OSError as error:
         raise cannot_write(path, error) from None
-    click.echo(
-        f"{path}: {metrics.distance_m:.0f} m of driving, {metrics.objects} buildings learned"
-    )
+    click.echo(f"{path}: {metrics.distance_m:.0f} m of driving; buildings: {headline(metrics)}")
 
 
 def _followed(reader: LogReader) -> tuple[RecordedMetrics, Tally]:

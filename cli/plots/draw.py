@@ -125,14 +125,14 @@ def name_objects(axes: Axes, objects: list[Percept], size: float) -> None:
         corners = outline_px(percept)
         x = float(corners[:, 0].min() + corners[:, 0].max()) / 2
         y = float(corners[:, 1].min())
-        text = f"{spoken(percept.label)}\n{percept.activation:.2f} · {percept.range_m:.1f} m"
+        text = f"{spoken(percept.name)}\n{percept.activation:.2f} · {percept.range_m:.1f} m"
         labels.append(Label(text, x, y, colour))
     place(axes, labels, size, chips=True)
 
 
-def spoken(label: str) -> str:
-    """Write a label as people do."""
-    return label.replace("_", " ")
+def spoken(name: str) -> str:
+    """Write a name as people do; what has none is unknown."""
+    return name.replace("_", " ") or "unknown"
 
 
 def outline_px(percept: Percept) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:

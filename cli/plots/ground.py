@@ -139,7 +139,7 @@ def name_in_plan(axes: Axes, objects: list[Percept], size: float) -> None:
     for percept, colour in zip(objects, colours_of(objects), strict=True):
         x, y = _from_above(_position_m(percept)[None])[0].tolist()
         labels.append(
-            Label(spoken(percept.label), x, y + min(2 * percept.range_sd_m, MAX_ABOVE_M), colour)
+            Label(spoken(percept.name), x, y + min(2 * percept.range_sd_m, MAX_ABOVE_M), colour)
         )
     place(axes, labels, size)
 

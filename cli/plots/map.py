@@ -11,14 +11,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from cogmap.cli.launch.drive_metrics import RecordedMetrics
+from cogmap.cli.launch.drive_metrics import RecordedMetrics, headline, judged
 from cogmap.cli.launch.observer import Observer
+from cogmap.cli.launch.tally import Tally
 from cogmap.cli.plots import map_layers as layers
 from cogmap.cli.plots import palette
 from cogmap.cli.plots.map_structure import draw_structure
 from cogmap.cli.plots.palette import ESTIMATE, FAINT, FUSED, INK, PAPER, TRUE, WHEELS
 from cogmap.cli.plots.town_layer import CHARGING_MARKER, draw_town
-from cogmap.graph.graph import Graph
 
 MARGIN_M = 5.0
 ROADSIDE_M = 20.0
@@ -28,8 +28,10 @@ DASHED = (0, (4, 2))
 DOTTED = (0, (1, 1.2))
 
 
-def draw(path: Path, observer: Observer, graph: Graph, metrics: RecordedMetrics) -> None:
+def draw(path: Path, tally: Tally, metrics: RecordedMetrics) -> None:
     """Write the map to `path` as a PNG."""
+    observer = tally.observer
+    graph = tally.replica.graph
     with mpl.rc_context(
         {"font.family": "sans-serif", "font.size": 9, "axes.edgecolor": palette.KERB}
     ):
@@ -39,7 +41,7 @@ def draw(path: Path, observer: Observer, graph: Graph, metrics: RecordedMetrics)
         if observer.town is not None:
             draw_town(axes, observer.town)
         layers.draw_road(axes, observer, graph)
-        layers.draw_objects(axes, observer, graph)
+        layers.draw_objects(axes, observer, graph, judged(tally))
 
         axes.plot(*observer.wheels_path_m.T, color=WHEELS, lw=1.6, ls=DASHED, zorder=8)
         axes.plot(
@@ -114,7 +116,7 @@ def _dress(
 
     place = metrics.recording or f"Town {metrics.seed}"
     driven = f"{place}, driven through for {metrics.distance_m:.0f} m in {metrics.drive_s:.0f} s"
-    learned = f"{metrics.objects} buildings and {metrics.road_m2:.0f} m² of street learned"
+    learned = f"buildings: {headline(metrics)}; {metrics.road_m2:.0f} m² of street learned"
     errors = (
         f"position error {metrics.estimate.mean_m:.2f} m on average; "
         f"{metrics.fused_alone.mean_m:.2f} m by fused self-motion alone"

@@ -9,6 +9,8 @@ from matplotlib.patches import Ellipse
 from matplotlib.transforms import Affine2D
 
 from cogmap.cli.launch.drive_metrics import objects, position_m
+from cogmap.cli.launch.individuals.buildings import NOTHING
+from cogmap.cli.launch.individuals.judge import Judgement
 from cogmap.cli.launch.observer import Observer
 from cogmap.cli.plots.palette import OBJECT, ROAD, ROAD_OPACITY
 from cogmap.graph.graph import Graph
@@ -37,29 +39,26 @@ def draw_road(axes: Axes, observer: Observer, graph: Graph) -> None:
         )
 
 
-def draw_objects(axes: Axes, observer: Observer, graph: Graph) -> None:
+def draw_objects(axes: Axes, observer: Observer, graph: Graph, judgement: Judgement | None) -> None:
     """Draw each object node with its samples, twice their standard deviation, and a line to the
-    building of its name.
+    middle of the building that most of its percepts show.
     """
-    buildings = (
-        {building.name: building.pose for building in observer.town.buildings}
-        if observer.town
-        else {}
-    )
+    if judgement is not None:
+        _draw_errors(axes, judgement)
+
     for node in objects(graph):
         middle = observer.to_world(np.array([position_m(node)]))[0]
-        true = buildings.get(node.label)
-        if true is not None:
-            axes.plot(
-                [middle[0], true.x_m],
-                [middle[1], true.y_m],
-                color=OBJECT,
-                lw=1.0,
-                alpha=0.8,
-                zorder=4,
-            )
         _draw_samples(axes, observer, node)
         axes.plot(*middle, "o", ms=5, mfc=OBJECT, mec="white", mew=0.8, zorder=7)
+
+
+def _draw_errors(axes: Axes, judgement: Judgement) -> None:
+    for each in judgement.individuals:
+        if each.building == NOTHING:
+            continue
+
+        ends_m = np.array([each.at_m, judgement.buildings.centres_m[each.building]])
+        axes.plot(*ends_m.T, color=OBJECT, lw=1.0, alpha=0.8, zorder=4)
 
 
 def _draw_samples(axes: Axes, observer: Observer, node: Object) -> None:

@@ -14,6 +14,7 @@ from cogmap.cli.plots.palette import CUT, GOAL, PLAN, SEVERAL, SHORTCUT
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
+from cogmap.graph.individuals import called
 from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, ROAD_FROM, WEIGHT_COLUMNS
 from cogmap.schemas.nodes import (
     NEVER_NS,
@@ -26,7 +27,6 @@ from cogmap.schemas.nodes import (
     PlaceColumn,
     Plan,
     is_coarse_map,
-    object_id,
 )
 
 STRAIGHT_LINKS = (0, 2)
@@ -114,8 +114,8 @@ def _draw_goals(axes: Axes, observer: Observer, graph: Graph) -> bool:
     """Draw a star where each goal is, filled if it was reached."""
     goals = list(graph.of_kind(Goal))
     for goal in goals:
-        where = graph.get(Object, object_id(goal.object)) if goal.object else None
-        x_m, y_m = (goal.x_m, goal.y_m) if where is None else (where.x_m, where.y_m)
+        where = called(goal.object, graph) if goal.object else []
+        x_m, y_m = (where[0].x_m, where[0].y_m) if where else (goal.x_m, goal.y_m)
         point_m = observer.to_world(np.array([[x_m, y_m]]))[0]
         colour = GOAL if goal.reached_ns != NEVER_NS else "white"
         axes.plot(*point_m, "*", ms=16, mfc=colour, mec=GOAL, mew=1.4, zorder=12)

@@ -21,6 +21,7 @@ from cogmap.cli.launch.drive_metrics import (
     Recording,
     RunMetrics,
     drive_metrics,
+    headline,
 )
 from cogmap.cli.launch.outcome import Ending, Outcome
 from cogmap.cli.launch.watch import Watch
@@ -54,7 +55,7 @@ def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
     from cogmap.cli.plots.map import draw  # half a second, which the start of a run is spared
 
     logging.getLogger("matplotlib").setLevel(logging.WARNING)
-    draw(drive.folder / MAP_NAME, watch.tally.observer, watch.tally.replica.graph, metrics)
+    draw(drive.folder / MAP_NAME, watch.tally, metrics)
     return metrics
 
 
@@ -103,10 +104,6 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         ratios = f"{ratios}, {metrics.error_ratio:.3f} over wheels"
     if not metrics.estimate.is_measured:
         ratios = "not measured"
-    learned = (
-        f"{metrics.objects} buildings, half of those that it knew by name within "
-        f"{metrics.object_error_median_m:.2f} m; {metrics.road_m2:.0f} m² of street"
-    )
     limits = Counter(metrics.halted) + Counter(metrics.slowed)
     shares = [f"{name} {number / metrics.commands:.0%}" for name, number in limits.most_common()]
     rows += [
@@ -114,7 +111,8 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         ("path integration alone, fused self-motion", _errors(metrics.fused_alone)),
         ("path integration alone, wheels", _errors(metrics.wheels_alone)),
         ("error ratio", ratios),
-        ("learned", learned),
+        ("buildings", headline(metrics)),
+        ("learned", f"{metrics.road_m2:.0f} m² of street"),
         ("forgotten", _first(metrics.forgotten, ", ") or "nothing"),
         ("cycle", f"{metrics.cycle_p50_ms:.0f} ms, 99 % within {metrics.cycle_p99_ms:.0f} ms"),
         ("slowed or halted", ", ".join(shares) or "never"),

@@ -1,21 +1,55 @@
-"""Individual objects that look alike, and where another one of them cannot stand."""
+"""Two objects that are one individual: they look alike, and stand where only one of them can."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 
-from cogmap.schemas.nodes import Object, look_of
+from cogmap.graph.graph import Graph
+from cogmap.graph.likeness import name_ratio
+from cogmap.schemas.nodes import Object, object_id
 
-APART_M = 6.0
-"""Buildings stand at least so far from one another."""
+OVERLAP = 0.5
+"""Two objects do not stand nearer than such a share of the mean of their widths."""
+
+SD = 2.0
+"""Standard deviations of where two objects are known to stand within which they may be one."""
 
 
 def is_same(one: Object, other: Object) -> bool:
-    """Return true if two objects of one map, which look alike, stand where only one of them can."""
-    if look_of(one.label) != look_of(other.label) or one.map != other.map:
+    """Return true if two objects of one map look alike, as far as they have names, and stand where
+    only one of them can.
+    """
+    if one.map != other.map or name_ratio(shares(one), other.names) < 1.0:
         return False
-    return math.dist((one.x_m, one.y_m), (other.x_m, other.y_m)) <= APART_M
+    return math.dist((one.x_m, one.y_m), (other.x_m, other.y_m)) <= reach_m(one, other)
+
+
+def reach_m(one: Object, other: Object) -> float:
+    """Return the distance within which two objects may be one: their footprints overlap, or their
+    places are not known any better.
+    """
+    sd_m = math.hypot(one.x_sd_m, one.y_sd_m, other.x_sd_m, other.y_sd_m)
+    return max(OVERLAP * (one.width_m + other.width_m) / 2, SD * sd_m)
+
+
+def called(name: str, graph: Graph) -> list[Object]:
+    """Return the objects that somebody means by a name: the one of that label, or that a person
+    calls so, or all that look so.
+    """
+    labelled = graph.get(Object, object_id(name))
+    if labelled is not None:
+        return [labelled]
+
+    objects = list(graph.of_kind(Object))
+    given = [node for node in objects if node.given_name == name]
+    return given or [node for node in objects if node.look == name]
+
+
+def shares(node: Object) -> dict[str, float]:
+    """Return the share of each name in the evidence for all that an object may be called."""
+    total = sum(node.names.values())
+    return {name: evidence / total for name, evidence in node.names.items() if name and total}
 
 
 def is_among(node: Object, others: Iterable[Object]) -> bool:

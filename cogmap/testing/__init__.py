@@ -6,10 +6,10 @@
     of_type         the messages, nodes or operations of one type
 
 and builders of what they are fed with: graphs and nodes (`graph_of`, `agent`, `landmark`, `cells`),
-what is sensed (`percept`, `percept_at`, `percepts`, `range_scan`, `odometry`, `self_motion`), and
-what is asked and broadcast (`context`, `task`, `broadcast`). Each has usual values for all that a
-test is not about. All of it runs on the in-memory bus, without pybullet, files or clocks;
-docs/testing.md has examples.
+what is sensed (`percept`, `percept_at`, `unidentified`, `percepts`, `range_scan`, `odometry`,
+`self_motion`), and what is asked and broadcast (`context`, `task`, `broadcast`). Each has usual
+values for all that a test is not about. All of it runs on the in-memory bus, without pybullet,
+files or clocks; docs/testing.md has examples.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ from cogmap.testing.builders import (
     self_motion,
     stamp_ns,
     task,
+    unidentified,
 )
 from cogmap.testing.observer import Observer, of_type
 from cogmap.testing.town import COGNITION, Town
@@ -58,4 +59,5 @@ __all__ = [
     "self_motion",
     "stamp_ns",
     "task",
+    "unidentified",
 ]

@@ -90,8 +90,11 @@ def range_scan(*rays: tuple[float, float], frame: int = 1, **facts: Any) -> Rang
 def percept(
     label: str = "house", bearing_rad: float = 0.0, range_m: float = 10.0, **facts: Any
 ) -> Percept:
-    """Make a percept of one building, whole and well recognized."""
+    """Make a percept of one building: whole, well recognized, and known of which individual object
+    it is, whose label is its name. `unidentified` leaves that for the workspace to find.
+    """
     usual: dict[str, Any] = {
+        "name": label,
         "activation": 0.9,
         "evidence": facts.get("activation", 0.9),
         "bearing_sd_rad": 0.02,
@@ -102,6 +105,11 @@ def percept(
         "box_px": (0, 0, 10, 10),
     }
     return Percept(label=label, bearing_rad=bearing_rad, range_m=range_m, **(usual | facts))
+
+
+def unidentified(seen: Percept, **facts: Any) -> Percept:
+    """Return a percept as perception publishes it: not known of which individual object it is."""
+    return msgspec.structs.replace(seen, label="", **facts)
 
 
 def percept_at(pose: npt.ArrayLike, label: str, position_m: npt.ArrayLike, **facts: Any) -> Percept:
@@ -134,11 +142,18 @@ def agent(samples: npt.ArrayLike | None = None, **facts: Any) -> Self:
 def landmark(
     label: str = "house", samples_m: npt.ArrayLike = ((10.0, 0.0),), **facts: Any
 ) -> Object:
-    """Make an object, fully active, with `samples_m` (n, 2) of its position."""
+    """Make an object, fully active, with `samples_m` (n, 2) of its position; its name is its label,
+    unless `facts` have other names.
+    """
     values = np.asarray(samples_m, np.float64)
     mean_m = values.mean(axis=0)
     offsets_m = Matrix.of(values - mean_m, "<f2")
-    usual = {"activation": 1.0, "x_m": float(mean_m[0]), "y_m": float(mean_m[1])}
+    usual: dict[str, Any] = {
+        "activation": 1.0,
+        "names": {label: 1.0},
+        "x_m": float(mean_m[0]),
+        "y_m": float(mean_m[1]),
+    }
     return Object(id=object_id(label), label=label, offsets_m=offsets_m, **(usual | facts))
 
 

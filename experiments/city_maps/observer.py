@@ -113,11 +113,13 @@ class Observer:
         seen = reading.observations(self._graph)
         where_m = transform_from(poses[seen.place], seen.where_m)
         numbers = {label: number for number, label in enumerate(seen.labels)}
+        objects = reading.objects_by_name(self._graph)
         buildings_m = np.full((len(self._names), 2), np.nan)
 
         for row, name in enumerate(self._names):
-            if name in numbers:
-                of_it = seen.landmark == numbers[name]
+            label = objects[name].label if name in objects else ""
+            if label in numbers:
+                of_it = seen.landmark == numbers[label]
                 buildings_m[row] = np.median(where_m[of_it], axis=0)
 
         return self._placed(buildings_m)

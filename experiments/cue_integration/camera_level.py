@@ -65,7 +65,7 @@ class PicturedRoom(Room):
         for look in range(LOOKS if self._are_lit else 0):
             turn_rad = math.tau * look / LOOKS
             for percept in self._look(turn_rad):
-                label = percept.label
+                label = percept.name
                 quality = (percept.whole, -abs(percept.bearing_rad))
                 if label not in best or quality > qualities[label]:
                     qualities[label] = quality

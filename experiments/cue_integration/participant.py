@@ -59,9 +59,9 @@ class Participant:
         # A post is carried from now on, and it is kept in mind where it was: the map may not have
         # it.
         for node in self._graph.of_kind(Percept):
-            if node.label.startswith("post-"):
+            if node.name.startswith("post-"):
                 there = pose.after(node.bearing_rad, node.range_m)
-                self._carried.setdefault(node.label, there.position)
+                self._carried.setdefault(node.name, there.position)
 
         scheme, parameters = self._choose(pose, agent.heading_sd_rad)
         return Action(

@@ -64,6 +64,7 @@ def sightings(
         bearing_rad = true_bearing_rad + float(rng.normal(0.0, sd))
         seen.append(
             Percept(
+                name=label,
                 label=label,
                 activation=1.0,
                 evidence=1.0,

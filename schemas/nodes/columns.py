@@ -94,6 +94,20 @@ class ObservationColumn(enum.IntEnum):
     DIRECTION_RAD = 5
 
 
+class RangeColumn(enum.IntEnum):
+    """Columns of observations of a landmark by its range alone from places of the path.
+
+    Where the agent stood then as seen from the place, forwards and left; the range and its standard
+    deviation.
+    """
+
+    STAMP_S = 0
+    FORWARDS_M = 1
+    LEFT_M = 2
+    RANGE_M = 3
+    RANGE_SD_M = 4
+
+
 class CorrectionColumn(enum.IntEnum):
     """Columns of a correction: when, and the pose of the path before and after."""
 
@@ -127,12 +141,16 @@ class RouteColumn(enum.IntEnum):
     Y_M = 1
 
 
-def check_matrix(node: str, matrix: Matrix, dtype: str, columns: tuple[int, ...]) -> None:
-    """Raise ValueError if a matrix is of another dtype or width, or has no rows or too many."""
+def check_matrix(
+    node: str, matrix: Matrix, dtype: str, columns: tuple[int, ...], least: int = 1
+) -> None:
+    """Raise ValueError if a matrix is of another dtype or width, or has fewer rows than `least`, or
+    too many.
+    """
     rows, width = matrix.shape
     if matrix.dtype != dtype or width not in columns:
         wanted = " or ".join(map(str, columns))
         raise ValueError(f"{node}: {matrix.dtype} of {width} columns, not {dtype} of {wanted}")
 
-    if not 1 <= rows <= MAX_ROWS:
-        raise ValueError(f"{node}: {rows} rows, not 1 to {MAX_ROWS}")
+    if not least <= rows <= MAX_ROWS:
+        raise ValueError(f"{node}: {rows} rows, not {least} to {MAX_ROWS}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import enum
+from string import ascii_lowercase
 
 ROOT_MAP = "map:0"
 COARSE_MAP = "map:coarse:"
@@ -21,8 +22,13 @@ class Side(enum.StrEnum):
 
 
 def object_id(label: str) -> str:
-    """Return the id of the object that perception calls `label`."""
+    """Return the id of the individual object of that label."""
     return f"object:{label}"
+
+
+def name_id(name: str) -> str:
+    """Return the id of the PAM node of all that has a name."""
+    return f"name:{name}"
 
 
 def category_id(function: str) -> str:
@@ -30,14 +36,18 @@ def category_id(function: str) -> str:
     return f"category:{function}"
 
 
-def individual_label(look: str, number: int) -> str:
-    """Return the label of one of the objects that perception calls `look`, numbered from 1."""
-    return look if number == 1 else f"{look}~{number}"
-
-
-def look_of(label: str) -> str:
-    """Return what perception calls an object, by the label that `individual_label` gave it."""
-    return label.partition("~")[0]
+def individual_label(cycle: int, number: int, origin: str = "") -> str:
+    """Return the label of object `number`, from 0, that a cycle adds to the map: the cycle's number
+    and a letter, as no other object has. What adds some to the map that perception did not has an
+    `origin`, a word that its labels begin with.
+    """
+    letters = ""
+    while True:
+        number, last = divmod(number, len(ascii_lowercase))
+        letters = ascii_lowercase[last] + letters
+        if number == 0:
+            return f"{origin}{cycle}{letters}"
+        number -= 1
 
 
 def goal_id(name: str) -> str:
@@ -50,11 +60,9 @@ def feeling_id(name: str) -> str:
     return f"feeling:{name}"
 
 
-def relation_id(side: Side, look: str) -> str:
-    """Return the id of the relation of standing next to what perception calls `look`, on
-    that side.
-    """
-    return f"{RELATION}{side}:{look}"
+def relation_id(side: Side, name: str) -> str:
+    """Return the id of the relation of standing next to what has a name, on that side."""
+    return f"{RELATION}{side}:{name}"
 
 
 def is_relation(identifier: str) -> bool:
@@ -63,7 +71,7 @@ def is_relation(identifier: str) -> bool:
 
 
 def percept_id(label: str) -> str:
-    """Return the id of the percept of the object that perception calls `label`."""
+    """Return the id of the percept of the object of that label."""
     return f"percept:{label}"
 
 

@@ -10,6 +10,7 @@ from cogmap.schemas.nodes.columns import (
     JoinColumn,
     ObservationColumn,
     PathColumn,
+    RangeColumn,
     check_matrix,
 )
 
@@ -36,15 +37,20 @@ class PathSegment(GraphNode, kw_only=True, frozen=True, tag="path_segment"):
 class Observations(GraphNode, kw_only=True, frozen=True, tag="observations"):
     """Observations of one landmark from places of path segment `number`.
 
-    `rows`: float64 (n, 6), see ObservationColumn.
+    `rows`: float64 (n, 6), see ObservationColumn. `ranges`: float64 (m, 5), see RangeColumn, are
+    those by range alone.
     """
 
     number: Count
     landmark: Name
     rows: Matrix
+    ranges: Matrix | None = None
 
     def __post_init__(self) -> None:
-        check_matrix(self.id, self.rows, "<f8", (len(ObservationColumn),))
+        least = 1 if self.ranges is None else 0
+        check_matrix(self.id, self.rows, "<f8", (len(ObservationColumn),), least)
+        if self.ranges is not None:
+            check_matrix(self.id, self.ranges, "<f8", (len(RangeColumn),))
 
 
 class LoopClosure(GraphNode, kw_only=True, frozen=True, tag="loop_closure"):
@@ -53,7 +59,8 @@ class LoopClosure(GraphNode, kw_only=True, frozen=True, tag="loop_closure"):
     What stands `ahead_m` and `left_m` of where the agent was at `from_ns` was seen at `range_m` and
     `bearing_rad` at `to_ns`, within `sd_m`. `cue` is the landmark, or the place; of a place the
     heading is known within `sd_rad`, which is 0 for a landmark. `before_ns` is when the landmark
-    was last seen on the pass before, and `view` how many closures it has given on this pass.
+    was last seen on the pass before, and `view` how many closures it has given on this pass. By
+    `range_alone` no single view closes a loop: all ranges to the landmark together do.
     `consistent` and `accepted` are None until map correction has judged it.
     """
 
@@ -68,6 +75,7 @@ class LoopClosure(GraphNode, kw_only=True, frozen=True, tag="loop_closure"):
     sd_rad: Spread
     before_ns: Stamp = 0
     view: Count = 0
+    range_alone: bool = False
     consistent: bool | None = None
     accepted: bool | None = None
 

@@ -37,10 +37,11 @@ class Recollection(GraphNode, kw_only=True, frozen=True, tag="recollection"):
     """A map that long-term memory takes for the town around, until it is joined to the root map.
 
     `x_m`, `y_m` and `heading_rad` are the pose of the root map's frame in that of the recalled map
-    `map`, whose places are as far apart. `labels` and `functions` are those of the objects whose
-    positions and sizes are in `objects`, see RecalledColumn; `matched` are the labels that they
-    have on the root map, empty if they have none. `tiles` are the squares of place nodes that
-    are known, and `columns` their values, (k, TILE_CELLS) float16 each, row-major as in a tile.
+    `map`, whose places are as far apart. `labels`, `names`, the names that people have given, and
+    `functions` are those of the objects whose positions and sizes are in `objects`, see
+    RecalledColumn; `matched` are the labels that they have on the root map, empty if they have
+    none. `tiles` are the squares of place nodes that are known, and `columns` their values,
+    (k, TILE_CELLS) float16 each, row-major as in a tile.
     `sub_maps` is the tree below it, of objects by their labels in `labels`.
     """
 
@@ -49,6 +50,8 @@ class Recollection(GraphNode, kw_only=True, frozen=True, tag="recollection"):
     y_m: Finite
     heading_rad: Finite
     labels: list[Name]
+    names: list[str]
+    given_names: list[str]
     functions: list[str]
     matched: list[str]
     objects: Matrix
@@ -59,7 +62,8 @@ class Recollection(GraphNode, kw_only=True, frozen=True, tag="recollection"):
     def __post_init__(self) -> None:
         check_matrix(self.id, self.objects, "<f8", (len(RecalledColumn),))
         count, _ = self.objects.shape
-        if {len(self.labels), len(self.functions), len(self.matched)} != {count}:
+        columns = (self.labels, self.names, self.given_names, self.functions, self.matched)
+        if {len(column) for column in columns} != {count}:
             raise ValueError(f"{self.id}: {count} objects, and other numbers of their names")
 
         for name, values in self.columns.items():

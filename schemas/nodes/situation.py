@@ -85,9 +85,12 @@ class Self(GraphNode, kw_only=True, frozen=True, tag="self"):
 
 
 class Percept(GraphNode, kw_only=True, frozen=True, tag="percept"):
-    """A PAM node over threshold: an object recognised in the view of this cycle."""
+    """A PAM node over threshold: an object in the view of this cycle. `label` is that of the
+    individual object that it is of, `name` what the view alone would call it.
+    """
 
     label: Name
+    name: str = ""
     bearing_rad: Finite
     range_m: Positive
 
@@ -97,8 +100,12 @@ FUNCTIONS = ("shop", "home", "school", "office", "works", *SATISFIED_BY.values()
 
 
 class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
-    """An object of the cognitive map, with samples of its position (paper §5.2).
+    """An individual object of the cognitive map, with samples of its position (paper §5.2).
 
+    `label` states which one it is, and nothing of what it is. `names` is what it may be called: the
+    evidence for each name summed over views, and that for none under the empty name. `given_name`
+    is what a person calls it. `appearances`, float16 (n, d), are what it looks like from several
+    sides.
     `offsets_m`: float16 (n, 2), the samples relative to their mean (`x_m`, `y_m`), which keeps them
     to a thousandth of their spread. `sightings` is the number of views that agree with the
     position, `misses` that of views in a row that do not. One that is `surveyed` was given, and
@@ -107,6 +114,9 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     """
 
     label: Name
+    names: dict[str, Positive] = {}
+    given_name: str = ""
+    appearances: Matrix | None = None
     function: str = ""
     map: Name = ROOT_MAP
     x_m: Finite
@@ -125,6 +135,16 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     def __post_init__(self) -> None:
         if self.offsets_m is not None:
             check_matrix(self.id, self.offsets_m, "<f2", (2,))
+
+    @property
+    def look(self) -> str:
+        """Return what most views would call it; empty if they have no name for it."""
+        return max(self.names, key=lambda name: (self.names[name], name)) if self.names else ""
+
+    @property
+    def name(self) -> str:
+        """Return what it is called: by a person, or else by perception; empty if it is not."""
+        return self.given_name or self.look
 
     def positions_m(self) -> npt.NDArray[np.float64]:
         """Return (n, 2) samples of its position; one, the mean, if it has none."""

@@ -53,6 +53,7 @@ ROWS = (
     Row("attention.danger"),
     Row("attention.place_lost"),
     Row("attention.episode"),
+    Row("individuals.merging"),
 )
 
 

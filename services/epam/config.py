@@ -49,11 +49,10 @@ class Priming(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=T
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """Weights of the networks, thresholds of percepts and of new PAM nodes, and priming.
+    """Weights of the networks, the threshold of percepts, and priming.
 
-    A segment that shows a building with a probability over `percept_threshold` is a percept,
-    labelled as the likeliest PAM node, with the current activation of that node: the probability of
-    its name.
+    A segment that shows a building with a probability over `percept_threshold` is a percept, with
+    the activation of the likeliest PAM node: the probability of its name.
     """
 
     priming: Annotated[
@@ -101,22 +100,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         msgspec.Meta(
             description="A segment is a percept if it shows a building with a higher probability. "
             "LIDA: 0.7 of total activation; here of that probability, because which "
-            "building it is, is decided by its evidence when it enters the workspace."
+            "building it is, is found by its place and look when it enters the workspace."
         ),
     ] = 0.7
-    familiar: Annotated[
-        Share,
-        msgspec.Meta(
-            description="A building that is well visible gets a PAM node unless it is recognized "
-            "as one that was taught with a higher activation: a stranger that is like "
-            "that has a name of its own, too."
-        ),
-    ] = 0.85
-    familiar_learned: Annotated[
-        Share,
-        msgspec.Meta(
-            description="The activation for one that was learned, in the place of `familiar`; "
-            "higher, because one encounter teaches less of a building, and a second "
-            "node for it does less harm than one node for two buildings."
-        ),
-    ] = 0.97

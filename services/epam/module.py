@@ -38,8 +38,8 @@ BUILT_IN = {
 
 
 class Perception:
-    """Turns each view into percepts. Between views it keeps what it learned: nodes of new
-    buildings, views to recognize places by, and what goes with what.
+    """Turns each view into percepts. Between views it keeps what it learned: views to recognize
+    places by, and what goes with what.
     """
 
     def __init__(
@@ -100,7 +100,7 @@ class Perception:
         # The features are found beside the objects.
         shows_place = descriptor.shows_place(arrays.image, arrays.depth_m)
         features = self._backbone.begin(arrays.image) if shows_place else None
-        perceived = self._pam.perceive(arrays, view.calibration, learning, prior)
+        perceived = self._pam.perceive(arrays, view.calibration, prior)
         code = None if features is None else descriptor.code(features.features())
         matches, remembered = self._places.observe(view.frame, view.stamp_ns, code, learning)
         percepts = Percepts(
@@ -112,13 +112,12 @@ class Perception:
             matches=matches,
         )
         self._last_percepts = percepts
-        if not perceived.learned and not remembered and associations is None:
+        if not remembered and associations is None:
             return [percepts]
 
         self._last_learned = Learned(
             stamp_ns=view.stamp_ns,
             frame=view.frame,
-            objects=perceived.learned,
             views=remembered,
             associations=associations,
         )
@@ -129,7 +128,6 @@ class Perception:
         for message in messages:
             if isinstance(message, Learned):
                 self._last_learned = message
-                self._pam.restore(message.objects)
                 self._places.restore(message.views)
                 if message.associations is not None:
                     self._primer.restore(message.associations)
@@ -140,7 +138,6 @@ class Perception:
         return Learned(
             stamp_ns=last.stamp_ns,
             frame=last.frame,
-            objects=self._pam.learned,
             views=list(self._places.all),
             associations=self._primer.published(),
         )

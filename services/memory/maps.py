@@ -10,7 +10,7 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.memory import StoredObjects, StoredRecord, StoredTile, StoredTree, tile_key
-from cogmap.schemas.nodes import PlaceColumn, RecalledColumn, look_of
+from cogmap.schemas.nodes import PlaceColumn, RecalledColumn
 
 NUMBERED = "remembered:"
 POSITION = slice(RecalledColumn.X_M, RecalledColumn.Y_M + 1)
@@ -36,7 +36,7 @@ class RememberedMap:
     @property
     def looks(self) -> list[str]:
         """Return what each of its objects looks like."""
-        return [] if self.known is None else [look_of(label) for label in self.known.labels]
+        return [] if self.known is None else self.known.names
 
     @property
     def at_m(self) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
-from cogmap.schemas.nodes import TILE_SIDE, Object, look_of
+from cogmap.schemas.nodes import TILE_SIDE, Object
 from cogmap.services.memory.maps import RememberedMap
 from cogmap.services.memory.matching import NOWHERE, Landmarks, best_matches
 from cogmap.services.memory.sequence_cue import MATCH_WITHIN_M, MIN_SHARE, Way, is_as_passed
@@ -64,7 +64,7 @@ def recalled(
     compared = []
     for remembered in stored:
         number = {look: index for index, look in enumerate(sorted(set(remembered.looks)))}
-        looks_here = [number.get(look_of(node.label), NOWHERE) for node in here]
+        looks_here = [number.get(node.look, NOWHERE) for node in here]
         looks_there = [number[look] for look in remembered.looks]
         found = best_matches(
             Landmarks(np.array(looks_here), here_m),
@@ -93,10 +93,11 @@ def recalled(
 
     # It has several looks, or few, and the stored map has along the way what was passed.
     labels = [""] * len(best.looks)
+    looks = set()
     for number_here, there in enumerate(match.there.tolist()):
         if there != NOWHERE:
             labels[there] = here[number_here].label
-    looks = {look_of(label) for label in labels if label}
+            looks.add(here[number_here].look)
     has_few = len(looks) < MIN_LOOKS_PASSED
     if has_few or (len(looks) < MIN_LOOKS and not is_as_passed(way, best, match.pose)):
         return None

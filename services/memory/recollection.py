@@ -34,6 +34,8 @@ def recollection(found: Recalled) -> Recollection:
         y_m=y_m,
         heading_rad=heading_rad,
         labels=remembered.known.labels,
+        names=remembered.known.names,
+        given_names=remembered.known.given_names,
         functions=remembered.known.functions,
         matched=found.matched,
         objects=remembered.known.objects,

@@ -15,7 +15,7 @@ from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.polylines import distances_along
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
-from cogmap.schemas.nodes import Object, PathColumn, look_of
+from cogmap.schemas.nodes import Object, PathColumn
 from cogmap.services.memory.maps import RememberedMap
 
 SEGMENTS = 3
@@ -66,7 +66,7 @@ def is_as_passed(way: Way, remembered: RememberedMap, pose: Floats) -> bool:
         return False
 
     here_m = transform_from(pose, np.array([(node.x_m, node.y_m) for node in way.learned]))
-    looks_here = np.array([look_of(node.label) for node in way.learned])
+    looks_here = np.array([node.look for node in way.learned])
     looks_there = remembered.looks
 
     known = 0

@@ -12,7 +12,7 @@ from cogmap.graph.graph import Graph
 from cogmap.schemas.cognition import Broadcast
 from cogmap.schemas.graph import Delta
 from cogmap.schemas.memory import Stored, StoredObjects, StoredRecord, StoredTile
-from cogmap.schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Object, Recollection, look_of
+from cogmap.schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Object, Recollection
 from cogmap.services.memory.associations import Associations
 from cogmap.services.memory.config import MIN_SIGHTINGS, Config
 from cogmap.services.memory.maps import RememberedMap, RememberedMaps
@@ -138,7 +138,7 @@ class SpatialMemory:
             for remembered in others:
                 self._associations.learn(remembered.name, remembered.looks, remembered.at_m)
 
-        looks = [look_of(node.label) for node in here]
+        looks = [node.look for node in here]
         at_m = np.array([(node.x_m, node.y_m) for node in here]).reshape(-1, 2)
         names = self._associations.reminded_of(looks, at_m)[: self._config.compared_maps]
         return [remembered for remembered in others if remembered.name in names]

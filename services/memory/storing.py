@@ -100,6 +100,8 @@ def stored_objects(name: str, objects: Iterable[Object], graph: Graph) -> list[S
         map=name,
         cell_m=graph.cell_m(ROOT_MAP),
         labels=[node.label for node in known],
+        names=[node.look for node in known],
+        given_names=[node.given_name for node in known],
         functions=[node.function for node in known],
         objects=Matrix.of(rows),
     )

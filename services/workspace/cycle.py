@@ -16,18 +16,16 @@ from cogmap.schemas.cognition import Broadcast, Competition
 from cogmap.schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
 from cogmap.schemas.process import Clock, Presence
 from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
+from cogmap.services.workspace.association.individuals import Individuals, as_entered
 from cogmap.services.workspace.commit import Ledger, coalitions_of
 from cogmap.services.workspace.config import Config
 from cogmap.services.workspace.dispatch import MAX_ATTEMPTS, Dispatch
 from cogmap.services.workspace.forgetting import Forgetting
-from cogmap.services.workspace.individuals import as_entered, individuals
 from cogmap.services.workspace.ingress import (
     check_percepts,
-    expected_operations,
     first_goals,
     first_operations,
     percept_operations,
-    recognised,
 )
 from cogmap.services.workspace.lane import Lanes
 from cogmap.services.workspace.learning.base_level import learned_operations
@@ -66,6 +64,7 @@ class Workspace:
         lease_ns = int(config.lease_ms * 1e6)
         self._dispatch = Dispatch(lease_ns, self._lanes.dispatches)
         self._forgetting = Forgetting()
+        self._individuals = Individuals(self._ledger.graph)
         offering = [name for name in OFFERING if run.has_any(name)]
         self._offers = Offers(offering if run.lockstep else ())
         self._consciousness = Consciousness(run.lockstep and run.has_any(COMPETITION))
@@ -90,6 +89,7 @@ class Workspace:
                 self._begun_ns = max(self._begun_ns, message.stamp_ns)
 
         self._forgetting.restore(self._ledger.graph)
+        self._individuals.known.restore()
         self._offers.restore(self._ledger.graph.cycle)
         self._consciousness.restore(self._ledger.graph.cycle)
 
@@ -175,7 +175,7 @@ class Workspace:
         delta = self._ledger.commit(
             proposal.stamp_ns, graph.cycle, Phase.LATE, proposal.operations, [proposal.task_id]
         )
-        self._forgetting.note(delta, graph)
+        self._note(delta)
         return [delta, *proposal.events]
 
     def on_presence(self, presence: Presence) -> list[Message]:
@@ -249,7 +249,7 @@ class Workspace:
         if self._is_interrupted(percepts):
             self._waiting = None
             motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
-            entered = as_entered(recognised(percepts), graph)
+            entered = as_entered(percepts, graph)
             self._context = self._sensed.context(entered, motions, graph.cycle, graph.version)
             self._phase = PLACE_OF.get(graph.phase, -1)
             return self._next_phase()
@@ -270,7 +270,7 @@ class Workspace:
         before_ns = self._begun_ns
         self._begun_ns = percepts.stamp_ns
         motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
-        entered = individuals(recognised(percepts), graph, motions)
+        entered = self._individuals.labelled(percepts, motions)
         self._context = self._sensed.context(entered, motions, graph.cycle + 1, graph.version)
         self._phase = -1
         self._is_repeated = False
@@ -280,7 +280,6 @@ class Workspace:
         entering += learned_operations(conscious, graph, self._context.cycle)
         entering += first_goals(self._config, before_ns, self._begun_ns)
         entering += percept_operations(graph, self._context)
-        entering = expected_operations(graph, percepts, entering, self._context.cycle)
         entering += self._sensed.needs(percepts.stamp_ns, self._context.cycle)
         entering += self._offers.take(self._ledger, entering, self._context.cycle)
         return [self._commit(Phase.PERCEPTS, entering), *self._next_phase()]
@@ -294,8 +293,13 @@ class Workspace:
         delta = self._ledger.commit(
             self._context.stamp_ns, self._context.cycle, phase, operations, tasks
         )
-        self._forgetting.note(delta, self._ledger.graph)
+        self._note(delta)
         return delta
+
+    def _note(self, delta: Delta) -> None:
+        """Keep up with what a commit has changed."""
+        self._forgetting.note(delta, self._ledger.graph)
+        self._individuals.known.note(delta)
 
     def _next_phase(self) -> list[Message]:
         """Give out the next phase's tasks; after the last, end the cycle."""

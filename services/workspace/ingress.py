@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
-from cogmap.graph import decay
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
 from cogmap.schemas.array import Matrix
@@ -18,7 +16,6 @@ from cogmap.schemas.nodes import (
     Goal,
     LinkKind,
     Map,
-    Object,
     Percept,
     Self,
     goal_id,
@@ -30,11 +27,6 @@ from cogmap.services.workspace.config import Config
 
 FIRST_SAMPLES = 200
 """Samples of the self before anything is known; localization draws as many as it wants."""
-
-RECOGNITION_THRESHOLD = 0.7
-"""A percept enters if its evidence is above this. LIDA: 0.7 of total activation; here of evidence,
-because the map is to be learned from what a view shows, and not from what was expected of it.
-"""
 
 PLACE_DECAY = 0.02
 """What a place node's activation loses in a cycle. LIDA: 0.1 in a tick; here less, because a place
@@ -107,45 +99,6 @@ def check_percepts(percepts: Percepts) -> None:
             raise MessageError(f"{name} points of shape {points_m.shape}")
 
 
-def recognised(percepts: Percepts) -> Percepts:
-    """Leave out the objects whose evidence in the view is not above `RECOGNITION_THRESHOLD`: what
-    they are is too uncertain to map by, however much they were expected.
-    """
-    objects = [percept for percept in percepts.objects if percept.evidence > RECOGNITION_THRESHOLD]
-    if len(objects) == len(percepts.objects):
-        return percepts
-    return msgspec.structs.replace(percepts, objects=objects)
-
-
-def expected_operations(
-    graph: Graph, percepts: Percepts, entering: list[Operation], cycle: int
-) -> list[Operation]:
-    """Add to `entering` the objects of the map that were recognised with the help of what was
-    conscious before: they are as active as their percepts, and are not placed anew.
-    """
-    excited: dict[str, Object] = {}
-    for percept in percepts.objects:
-        node = graph.get(Object, object_id(percept.label))
-        is_primed = percept.evidence <= RECOGNITION_THRESHOLD < percept.activation
-        if node is not None and is_primed:
-            excited[node.id] = msgspec.structs.replace(
-                node,
-                activation=max(percept.activation, decay.activation(node, cycle, graph.decay)),
-                base_level=decay.base_level(node, cycle, graph.decay),
-                cycle=cycle,
-            )
-
-    operations: list[Operation] = []
-    for operation in entering:
-        known = excited.pop(operation.id, None) if isinstance(operation, Object) else None
-        if known is None:
-            operations.append(operation)
-        else:
-            operations.append(msgspec.structs.replace(operation, activation=known.activation))
-
-    return [*operations, *excited.values()]
-
-
 def percept_operations(graph: Graph, context: CycleContext) -> list[Operation]:
     """Make the PAM nodes over threshold, each linked to the object that it is an instance of."""
     operations: list[Operation] = []
@@ -157,6 +110,7 @@ def percept_operations(graph: Graph, context: CycleContext) -> list[Operation]:
             cycle=context.cycle,
             salience=percept.salience,
             label=percept.label,
+            name=percept.name,
             bearing_rad=percept.bearing_rad,
             range_m=percept.range_m,
         )

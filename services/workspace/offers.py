@@ -79,6 +79,7 @@ def _with_objects(
 ) -> list[Operation]:
     """Link each object of `operations` to its place node; reject those that are on the map already:
     their label is taken, perhaps by what is seen right now, or one of their look is at that place.
+    One on the map that is offered with another name is called that from now on.
     """
     graph = ledger.graph
     entered = {each.id for each in entering if isinstance(each, GraphNode)}
@@ -87,6 +88,11 @@ def _with_objects(
     for operation in operations:
         if not isinstance(operation, Object):
             accepted.append(operation)
+            continue
+
+        known = graph.get(Object, operation.id)
+        if known is not None and operation.given_name not in {"", known.given_name}:
+            accepted.append(msgspec.structs.replace(known, given_name=operation.given_name))
             continue
 
         if present is None:

@@ -189,6 +189,6 @@ def test_doctor_names_what_is_missing_and_what_is_off_its_rate(robot: Robot, end
     output, _ = printed(endpoint, "doctor", "--json", code=1)
 
     about = {finding["about"] for finding in json.loads(output)}
-    assert {*registry.MODULES} - {"sim"} <= about
+    assert {*registry.MODULES} - {"sim", "player"} <= about
     assert {"odometry", "sensory/motion"} <= about
     assert "sim" not in about

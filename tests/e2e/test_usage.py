@@ -89,7 +89,7 @@ def endpoint() -> Iterator[str]:
             "name one that exists",
         ),
         (["module", "workspace", "--config", "/"], "cannot read / as TOML", "Is a directory"),
-        (["module", "memory-of-tomorrow"], "'memory-of-tomorrow'", "there are sim, sensory"),
+        (["module", "memory-of-tomorrow"], "'memory-of-tomorrow'", "there are sim, player"),
         (
             ["module", "workspace", "--connect", "localhost"],
             "'localhost'",

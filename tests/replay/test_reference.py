@@ -1,7 +1,7 @@
 """The committed log of a small drive, compared with what each module publishes today.
 
 Sines, sums and image filters may round differently on another processor, so there most modules are
-compared with a log that is recorded on the spot. Two compute with nothing but additions,
+compared with a log that is recorded on the spot. One computes with nothing but additions,
 comparisons and minima of single numbers, which are the same everywhere.
 """
 
@@ -29,7 +29,9 @@ from tests.support.reference import (
     sections,
 )
 
-SAME_EVERYWHERE = ("workspace", "global_workspace")
+SAME_EVERYWHERE = ("global_workspace",)
+# Those that take part in a drive through a simulated town: the player takes the simulation's place.
+TAKING_PART = [name for name in registry.MODULES if name != "player"]
 MAX_BYTES = 1_500_000
 # The first cycle has no broadcast, and the last may end before its own is answered.
 MIN_OUTPUTS = FRAMES - 2
@@ -64,7 +66,7 @@ def fresh(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return log
 
 
-@pytest.mark.parametrize("module", registry.MODULES)
+@pytest.mark.parametrize("module", TAKING_PART)
 def test_a_module_publishes_the_bytes_of_the_reference(module: str) -> None:
     if module not in SAME_EVERYWHERE:
         _needs_the_same_arithmetic()
@@ -77,7 +79,7 @@ def test_a_module_publishes_the_bytes_of_the_reference(module: str) -> None:
     assert outcome.notes == []
 
 
-@pytest.mark.parametrize("module", registry.MODULES)
+@pytest.mark.parametrize("module", TAKING_PART)
 def test_a_module_publishes_the_bytes_of_a_drive_on_this_machine(fresh: Path, module: str) -> None:
     outcome = _replayed(fresh, module)
 

@@ -15,10 +15,11 @@ from cogmap.schemas.cognition import (
     Rejection,
 )
 from cogmap.schemas.graph import Delta, DropNode, Phase
-from cogmap.schemas.nodes import SELF_ID, Object, Self, object_id
+from cogmap.schemas.nodes import SELF_ID, Self
 from cogmap.schemas.sensing import MotorCommand, Percept, Percepts
 from cogmap.services.global_workspace.config import Config
 from cogmap.services.global_workspace.module import GlobalWorkspace
+from cogmap.testing import landmark
 from tests.support.logs import Row
 
 MS_NS = 10**6
@@ -82,7 +83,7 @@ def percepts(cycle: int, *labels: str) -> Percepts:
 def percept(label: str) -> Percept:
     """An object 12 m ahead."""
     return Percept(
-        label=label,
+        name=label,
         activation=0.9,
         evidence=0.9,
         bearing_rad=0.5,
@@ -110,7 +111,7 @@ def delta(cycle: int, phase: Phase, *tasks: str) -> Delta:
 
 def coalition(codelet: str, activation: float, name: str) -> Coalition:
     """The agent and a library, by that id."""
-    library = Object(id=object_id("library"), label="library", x_m=15.0, y_m=0.0)
+    library = landmark("library", [(15.0, 0.0)])
     return Coalition(id=name, codelet=codelet, activation=activation, nodes=[AGENT, library])
 
 

@@ -51,7 +51,7 @@ def percepts(moment: Moment) -> Box:
     coloured.sort(key=lambda each: -each[0].activation)
     blocks: list[Block] = []
     for percept, colour in coloured[:MOST]:
-        label = heading(names.spoken(percept.label), "", width_in)
+        label = heading(names.of_look(percept.name), "", width_in)
         lines = [names.of_percept(percept)]
         if percept.feelings:
             lines += wrapped(names.of_feelings(percept), inner_in(width_in), SMALL, 2)

@@ -11,7 +11,7 @@ from cogmap.schemas.array import Matrix
 from cogmap.schemas.cognition import Coalition, Relation
 from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.graph import Link
-from cogmap.schemas.nodes import AnyNode, Goal, LinkKind, Object, Plan, Self, look_of, object_id
+from cogmap.schemas.nodes import AnyNode, Goal, LinkKind, Object, Plan, Self, object_id
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.nodes import nodes_of
 
@@ -49,9 +49,8 @@ def coalition(
     for percept in percepts:
         name = object_id(percept.label)
         if name in strengths and percept.has_bearing and percept.has_range:
-            look = look_of(percept.label)
             relations[name] = Relation(
-                look=look, range_m=percept.range_m, bearing_rad=percept.bearing_rad
+                look=percept.name, range_m=percept.range_m, bearing_rad=percept.bearing_rad
             )
 
     # The maps that nodes are on, and the sub-maps that they are in, each once.

@@ -33,10 +33,13 @@ from cogmap.schemas.nodes import (
     Self,
     is_coarse_map,
     nearest_place,
+    object_id,
 )
 from cogmap.services.codelets.correction.place_columns import MOVED_COLUMNS, move_places
+from cogmap.services.codelets.localization.sampling import generator
 from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import POSE, STAMP, with_rows
+from cogmap.services.codelets.mapping.ranges import Ranges
 
 OLD = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_HEADING_RAD + 1)
 NEW = slice(CorrectionColumn.NEW_X_M, CorrectionColumn.NEW_HEADING_RAD + 1)
@@ -132,6 +135,7 @@ def _move_objects(graph: Graph, rows: Floats, path: Floats) -> list[Operation]:
     """
     seen = Sightings.of(graph.of_kind(Observations), path[:, STAMP])
     landmarks_m = dict(zip(seen.labels, seen.landmarks_m(path[:, POSE]), strict=True))
+    heard_m = _heard(graph, path)
 
     operations: list[Operation] = []
     for node in graph.of_kind(Object):
@@ -142,6 +146,8 @@ def _move_objects(graph: Graph, rows: Floats, path: Floats) -> list[Operation]:
         mean_m = positions_m.mean(axis=0)
         if node.label in landmarks_m:
             moved_m = positions_m + landmarks_m[node.label] - mean_m
+        elif node.label in heard_m:
+            moved_m = heard_m[node.label]
         else:
             row = _row_of(node, mean_m, rows)
             moved_m = move_with(positions_m, row[:, OLD], row[:, NEW])
@@ -154,6 +160,28 @@ def _move_objects(graph: Graph, rows: Floats, path: Floats) -> list[Operation]:
             operations += [after, _place_link(after, graph)]
 
     return operations
+
+
+def _heard(graph: Graph, path: Floats) -> dict[str, Floats]:
+    """Draw (n, 2) positions for each landmark that was observed by its range alone, along the
+    corrected `path`: how a ring that it stood on moves, its samples do not say.
+    """
+    ranges = Ranges.of(graph.of_kind(Observations), path[:, STAMP])
+    if not ranges.labels:
+        return {}
+
+    found = ranges.landmarks(path[:, POSE])
+    rng = generator(f"{path[-1, STAMP]}/{len(path)}")
+    drawn = {}
+    for label, mean_m, covariance_m2 in zip(
+        ranges.labels, found.positions_m, found.covariance_m2, strict=True
+    ):
+        node = graph.get(Object, object_id(label))
+        if node is not None:
+            count = len(node.positions_m())
+            drawn[label] = rng.multivariate_normal(mean_m, covariance_m2, count)
+
+    return drawn
 
 
 def _move_maps(graph: Graph, rows: Floats) -> list[Operation]:

@@ -12,6 +12,7 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import FULL_TURN_RAD
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.mapping.observations import Sightings
+from cogmap.services.codelets.mapping.ranges import Landmarks, Ranges
 
 # Times that sightings are weighed anew by the path that is found: each solves the whole path.
 ROUNDS = 5
@@ -22,9 +23,12 @@ SIDES = 16
 CORRELATED = 5.0
 
 
-def optimize_jointly(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
-    """Close the loops of `graph`, and bind its poses to what was seen along the path. Return the
-    (n, 3) poses, and how often the whole path was solved for that.
+def optimize_jointly(
+    graph: PoseGraph, seen: Sightings, heard: Ranges, config: Config
+) -> tuple[Floats, int]:
+    """Close the loops of `graph`, and bind its poses to what was seen along the path, and to what
+    was heard at a range alone. Return the (n, 3) poses, and how often the whole path was solved for
+    that.
 
     Where a landmark seems to be depends on the side that it is seen from: of a building the front
     is measured, and its depth assumed. So each of its sides is taken for a landmark of its own,
@@ -32,8 +36,11 @@ def optimize_jointly(graph: PoseGraph, seen: Sightings, config: Config) -> tuple
     alike: CORRELATED of them count as one. Points have one side, and their sightings err
     independently.
     """
-    poses = optimize(graph)
-    if not len(seen.place):
+    # Ranges are led from what is believed, which they have corrected before: each correction begins
+    # where the last one ended.
+    is_heard_alone = len(heard.place) > 0 and not len(seen.place)
+    poses = graph.poses if is_heard_alone else optimize(graph)
+    if not len(seen.place) and not is_heard_alone:
         return poses, 1
 
     are_points = config.landmarks == "points"
@@ -43,11 +50,26 @@ def optimize_jointly(graph: PoseGraph, seen: Sightings, config: Config) -> tuple
     for _ in range(ROUNDS):
         path = replace(graph, poses=poses)
         joint = with_landmarks(path, sides, landmarks_m, correlated)
+        joint = with_ranges(joint, heard, heard.landmarks(poses))
         optimized = optimize(joint)
+        landmarks_m = optimized[len(poses) : len(poses) + len(landmarks_m), :2]
         poses = optimized[: len(poses)]
-        landmarks_m = optimized[len(poses) :, :2]
 
     return poses, 1 + ROUNDS
+
+
+def with_ranges(graph: PoseGraph, heard: Ranges, found: Landmarks) -> PoseGraph:
+    """Add landmarks as they were `found` by range alone to `graph`, as poses after its own, bound
+    to it by their ranges.
+    """
+    landmarks_m = found.positions_m
+    landmarks = np.column_stack([landmarks_m, np.zeros(len(landmarks_m))])
+    ranges = heard.constraints(graph.poses, found, len(graph.poses))
+    return replace(
+        graph,
+        poses=np.vstack([graph.poses, landmarks]),
+        closures=graph.closures + ranges,
+    )
 
 
 def with_landmarks(

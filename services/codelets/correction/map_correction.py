@@ -52,6 +52,7 @@ from cogmap.services.codelets.correction.joint import optimize_jointly
 from cogmap.services.codelets.correction.synapses import replay_of
 from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import POSE, STAMP, joins_of, steps_of
+from cogmap.services.codelets.mapping.ranges import Ranges
 from cogmap.services.codelets.mapping.views import constraints_of, views_of
 
 # Places of the path, 1 m apart, that a loop has at least.
@@ -83,7 +84,8 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     since_ns = context.stamp_ns - config.revisit_s * 1e9
     late = [closure for closure in closures if closure.to_ns > since_ns]
     fresh = [closure for closure in late if closure.accepted is None]
-    if not fresh or len(late) < MIN_AGREEING:
+    is_heard = any(closure.range_alone for closure in fresh)
+    if not fresh or (len(late) < MIN_AGREEING and not is_heard):
         return []
 
     # Correcting a path takes as long as it is, so it is done as much less often: it takes the same
@@ -97,7 +99,7 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     path = graph.path
     is_corrected = any(closure.accepted for closure in closures)
     is_long = any(segment.is_sparse for segment in path)
-    if is_corrected and is_long and may_be_deferred(fresh, rows_of(path)):
+    if is_corrected and is_long and not is_heard and may_be_deferred(fresh, rows_of(path)):
         return []
 
     return [context.task(CODELET.name, about=[closure.id for closure in fresh])]
@@ -127,7 +129,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         return Answer(operations)
 
     seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])
-    poses, replays = corrected(judgement.path, seen, config)
+    heard = Ranges.of(graph.of_kind(Observations), rows[:, STAMP])
+    poses, replays = corrected(judgement.path, seen, heard, config)
     if config.anchor == "map":
         # Moved as one to where the path was believed to be as far as earlier corrections reach;
         # without any, to where it was corrected from.
@@ -174,7 +177,7 @@ def may_be_deferred(closures: list[LoopClosure], rows: Floats) -> bool:
     or all but so few that they close no loop.
     """
     poses = rows[:, POSE]
-    views = views_of(closures, rows)
+    views = views_of([each for each in closures if not each.range_alone], rows)
     constraints = constraints_of(views, poses)
     squared = mahalanobis2(residuals(poses, constraints), constraints.information)
 
@@ -195,10 +198,13 @@ class _Judgement(NamedTuple):
 
 
 def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config) -> _Judgement:
-    """Return which of the closures of a path are consistent, and of these accepted."""
+    """Return which of the closures of a path are consistent, and of these accepted. Those by range
+    alone are always: the ranges are weighed one by one as the path is corrected.
+    """
     rows = rows_of(path)
     steps = steps_of(rows, config)
-    views = views_of(closures, rows)
+    is_view = np.array([not each.range_alone for each in closures])
+    views = views_of([each for each in closures if not each.range_alone], rows)
     is_consistent = consistent(views, steps, FALSE_CLOSURE)
     is_consistent &= views.j - views.i >= MIN_ROWS
 
@@ -208,7 +214,7 @@ def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config)
     if sparse:
         until_ns = sparse[-1].rows.numpy()[-1, STAMP] * 1e9
         settled = [bool(each.consistent) and each.to_ns <= until_ns for each in closures]
-        is_consistent |= np.array(settled)
+        is_consistent |= np.array(settled)[is_view]
 
     start = PoseGraph(
         poses=_start(rows[:, POSE], steps),
@@ -230,9 +236,11 @@ def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config)
             break
         loops = again
 
-    is_accepted = np.zeros(len(closures), bool)
-    is_accepted[is_consistent] = holds
-    return _Judgement(is_consistent, is_accepted, graph)
+    agrees = np.ones(len(closures), bool)
+    agrees[is_view] = is_consistent
+    is_accepted = agrees.copy()
+    is_accepted[is_view & agrees] = holds
+    return _Judgement(agrees, is_accepted, graph)
 
 
 def _start(poses: Floats, steps: Constraints) -> Floats:
@@ -250,7 +258,9 @@ def _start(poses: Floats, steps: Constraints) -> Floats:
     return np.column_stack([poses[0, :2] + moved_m, wrap_angle(heading_rad)])
 
 
-def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats, int]:
+def corrected(
+    graph: PoseGraph, seen: Sightings, heard: Ranges, config: Config
+) -> tuple[Floats, int]:
     """Close all loops, by the paper's rule or with the headings. Return the (n, 3) poses, and how
     often the whole path was replayed for that: reverse replays of eq. 9, or solutions with the
     headings.
@@ -262,4 +272,4 @@ def corrected(graph: PoseGraph, seen: Sightings, config: Config) -> tuple[Floats
         found = close_loops(with_positions_only(graph))
         return np.column_stack([found.positions_m, graph.poses[:, 2]]), found.replays
 
-    return optimize_jointly(graph, seen, config)
+    return optimize_jointly(graph, seen, heard, config)

@@ -23,6 +23,7 @@ from cogmap.schemas.nodes import (
     LoopClosure,
     ObservationColumn,
     Observations,
+    RangeColumn,
     observations_id,
 )
 from cogmap.services.codelets.correction.joining import JOIN_SD_M, Joining
@@ -45,11 +46,12 @@ def observations_left(
         rows = node.rows.numpy()
         place = joined.places[:, STAMP].searchsorted(rows[:, ObservationColumn.STAMP_S])
         stays = joined.stays[place]
-        if stays.all():
+        ranges_left = _ranges_left(node, joined)
+        if stays.all() and ranges_left == node.ranges:
             continue
 
-        if stays.any():
-            left = msgspec.structs.replace(node, rows=Matrix.of(rows[stays]))
+        if stays.any() or ranges_left is not None:
+            left = msgspec.structs.replace(node, rows=Matrix.of(rows[stays]), ranges=ranges_left)
             operations.append(left)
         else:
             operations.append(DropNode(id=node.id))
@@ -81,12 +83,26 @@ def observations_left(
             number=number,
             landmark=landmark,
             rows=Matrix.of(rows[first]),
+            ranges=None if before is None else before.ranges,
         )
         operations.append(after)
         if before is None:
             operations += links_of(after)
 
     return operations
+
+
+def _ranges_left(node: Observations, joined: Joining) -> Matrix | None:
+    """Return the ranges alone that are from places which stay: a landmark is heard along the whole
+    path, so that those from the joined places are not missed.
+    """
+    if node.ranges is None:
+        return None
+
+    ranges = node.ranges.numpy()
+    place = joined.places[:, STAMP].searchsorted(ranges[:, RangeColumn.STAMP_S])
+    left = ranges[joined.stays[place]]
+    return Matrix.of(left) if len(left) else None
 
 
 def closures_left(closures: Sequence[LoopClosure], ends: Views, joined: Joining) -> list[Operation]:

@@ -4,7 +4,6 @@ Pure.
 
 from __future__ import annotations
 
-import itertools
 import math
 
 import msgspec
@@ -13,7 +12,7 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
-from cogmap.graph.individuals import APART_M
+from cogmap.graph.individuals import is_same
 from cogmap.schemas.graph import Link, Operation
 from cogmap.schemas.nodes import (
     NEVER_NS,
@@ -23,12 +22,33 @@ from cogmap.schemas.nodes import (
     RecalledColumn,
     Recollection,
     individual_label,
-    look_of,
     nearest_place,
     object_id,
 )
 
-POSITION = slice(RecalledColumn.X_M, RecalledColumn.Y_M + 1)
+ORIGIN = "recalled"
+
+
+def _recalled(recalled: Recollection, number: int) -> Object:
+    """Return one of the recalled objects as it was, in the recalled map's frame."""
+    row = recalled.objects.numpy()[number].tolist()
+    sightings = int(row[RecalledColumn.SIGHTINGS])
+    label = recalled.labels[number]
+    return Object(
+        id=object_id(label),
+        label=label,
+        names={recalled.names[number]: float(max(1, sightings))},
+        given_name=recalled.given_names[number],
+        function=recalled.functions[number],
+        x_m=row[RecalledColumn.X_M],
+        y_m=row[RecalledColumn.Y_M],
+        x_sd_m=row[RecalledColumn.X_SD_M],
+        y_sd_m=row[RecalledColumn.Y_SD_M],
+        width_m=row[RecalledColumn.WIDTH_M],
+        height_m=row[RecalledColumn.HEIGHT_M],
+        sightings=sightings,
+        last_seen_ns=NEVER_NS,
+    )
 
 
 def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list[Operation]:
@@ -45,52 +65,57 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
     labels = []
     for number, match in enumerate(recalled.matched):
         label = match
-        look = look_of(recalled.labels[number])
-        at_m = recalled.objects.numpy()[number, POSITION]
-        nearest_m = APART_M
+        there = _recalled(recalled, number)
+        at_m = (there.x_m, there.y_m)
+        nearest_m = math.inf
         candidates = () if match else zip(known, here_m, strict=True)
-        for node, there_m in candidates:
+        for other, there_m in candidates:
             away_m = math.dist(there_m, at_m)
-            is_free = look_of(node.label) == look and node.label not in matched
-            if is_free and away_m <= nearest_m:
-                label = node.label
+            moved = msgspec.structs.replace(other, x_m=there_m[0], y_m=there_m[1])
+            is_it = other.label not in matched and is_same(moved, there)
+            if is_it and away_m <= nearest_m:
+                label = other.label
                 nearest_m = away_m
 
         matched.add(label)
         labels.append(label)
 
     node_of = {node.label: node for node in known}
-    taken = set(node_of) | {label for label in labels if label}
-
     operations: list[Operation] = []
     for number, label in enumerate(labels):
-        own = label
-        if not own:
-            look = look_of(recalled.labels[number])
-            names = (individual_label(look, each) for each in itertools.count(1))
-            own = next(name for name in names if name not in taken)
-
-        taken.add(own)
-        row = recalled.objects.numpy()[number].tolist()
-        here = node_of.get(own)
-        if here is None:
-            here = Object(id=object_id(own), label=own, x_m=0.0, y_m=0.0, last_seen_ns=NEVER_NS)
+        there = _recalled(recalled, number)
+        own = label or individual_label(graph.cycle, number, ORIGIN)
 
         # It is as it was recalled, with what was learned of it in this run.
         node = msgspec.structs.replace(
-            here,
+            there,
+            id=object_id(own),
+            label=own,
             base_level=1.0,
             cycle=graph.cycle,
-            function=recalled.functions[number] or here.function,
-            x_m=row[RecalledColumn.X_M],
-            y_m=row[RecalledColumn.Y_M],
-            x_sd_m=row[RecalledColumn.X_SD_M],
-            y_sd_m=row[RecalledColumn.Y_SD_M],
-            width_m=row[RecalledColumn.WIDTH_M],
-            height_m=row[RecalledColumn.HEIGHT_M],
-            sightings=here.sightings + int(row[RecalledColumn.SIGHTINGS]),
-            offsets_m=None,
         )
+        here = node_of.get(own)
+        if here is not None:
+            names = {
+                name: here.names.get(name, 0.0) + there.names.get(name, 0.0)
+                for name in {**there.names, **here.names}
+            }
+            node = msgspec.structs.replace(
+                here,
+                names=names,
+                given_name=here.given_name or there.given_name,
+                base_level=1.0,
+                cycle=graph.cycle,
+                function=there.function or here.function,
+                x_m=there.x_m,
+                y_m=there.y_m,
+                x_sd_m=there.x_sd_m,
+                y_sd_m=there.y_sd_m,
+                width_m=there.width_m,
+                height_m=there.height_m,
+                sightings=here.sightings + there.sightings,
+                offsets_m=None,
+            )
         place = nearest_place(node.x_m, node.y_m, graph.cell_m(ROOT_MAP))
         operations += [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
 

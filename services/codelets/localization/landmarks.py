@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 import msgspec
 import numpy as np
 
@@ -9,6 +12,7 @@ from cogmap.errors import MessageError
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import mean_pose, wrap_angle
 from cogmap.graph.graph import Graph
+from cogmap.graph.likeness import distribution
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.codelets import Task
@@ -29,6 +33,7 @@ from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.localization.measurement_model import (
     FARTHEST_M,
     GATE,
+    MAX_SD_SHARE,
     MIN_SIGHTINGS,
     is_seen_from_here,
 )
@@ -44,10 +49,14 @@ from cogmap.services.codelets.localization.sampling import (
 GAP = 3.0
 # The agent's own uncertainty counts for a landmark up to this share of `largest_landmark_sd_m`.
 LOCAL_SHARE = 0.5
+# A sighting that deviates by this many standard deviations counts half as much as one that fits.
+DOUBTED = 2.0
 # Noise of the range places no landmark nearer, or behind the agent.
 MIN_RANGE_M = 0.1
 # Successive misfits after which a landmark is placed anew.
 MISSES = 8
+# Names that an object may have, beside others that are less likely.
+MAX_NAMES = 4
 # An object that was seen twice is remembered for 40 s, about until it may be seen again:
 # measured in an hour's drive through one town (benchmark `lifelong`).
 CONFIRMED_BASE_LEVEL = 0.15
@@ -114,6 +123,10 @@ def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config:
     selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
     selves = rng.permutation(resample(selves, len(before), 0.0, rng))
     mahalanobis2 = _mahalanobis2(before, selves, percept)
+    if mahalanobis2.min() < GATE**2 and is_well_placed(landmark, percept):
+        fitting = msgspec.structs.replace(landmark, sightings=landmark.sightings + 1, misses=0)
+        return with_positions(fitting, moved_towards(before, selves, percept, config))
+
     if mahalanobis2.min() < GATE**2:
         log_likelihood = -mahalanobis2 / 2 / config.correlated_views
         kept = before[rejection_mask(log_likelihood, rng)]
@@ -132,6 +145,52 @@ def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config:
 
     anew = msgspec.structs.replace(landmark, sightings=1, misses=0, created_ns=task.stamp_ns)
     return with_positions(anew, first_positions(selves, percept, rng))
+
+
+def is_well_placed(landmark: Object, percept: Percept) -> bool:
+    """Decide whether a landmark's samples are a cloud, no ring or ray, and the percept would place
+    it by itself.
+    """
+    if not (percept.has_bearing and percept.has_range):
+        return False
+    return math.hypot(landmark.x_sd_m, landmark.y_sd_m) < MAX_SD_SHARE * percept.range_m
+
+
+def moved_towards(positions_m: Floats, selves: Floats, percept: Percept, config: Config) -> Floats:
+    """Move (n, 2) samples of a landmark's position towards where it is seen from (n, 7) samples of
+    the self, and draw them together, as an ensemble Kalman filter does (Evensen 1994).
+
+    Rejection keeps the best of the samples that there are: if the first sighting was from afar, all
+    of them may be wrong by as much. A view counts as one of `correlated_views`, and the less, the
+    worse it fits: it may be of another landmark, or of a part of this one.
+    """
+    mean_m = positions_m.mean(axis=0)
+    offsets_m = positions_m - mean_m
+    covariance = offsets_m.T @ offsets_m / len(offsets_m)
+    covariance += config.landmark_jitter_m**2 * np.eye(2)
+
+    here = mean_pose(selves)
+    direction_rad = float(here[2]) + percept.bearing_rad
+    range_m = percept.range_m / (1 + float(selves[:, SelfColumn.RANGE_GAIN].mean()))
+    along = np.array([math.cos(direction_rad), math.sin(direction_rad)])
+    across = np.array([-along[1], along[0]])
+    seen_m = here[:2] + range_m * along
+
+    across_sd_m = range_m * percept.bearing_sd_rad
+    noise = percept.range_sd_m**2 * np.outer(along, along)
+    noise += across_sd_m**2 * np.outer(across, across)
+
+    innovation_m = seen_m - mean_m
+    squared = innovation_m @ np.linalg.solve(covariance + noise, innovation_m)
+    doubt = 1 + float(squared) / DOUBTED**2
+    gain = covariance @ np.linalg.inv(covariance + config.correlated_views * doubt * noise)
+
+    moved_m = mean_m + gain @ innovation_m
+    after = (np.eye(2) - gain) @ covariance
+    shrink = np.linalg.cholesky((after + after.T) / 2) @ np.linalg.inv(
+        np.linalg.cholesky(covariance)
+    )
+    return np.asarray(moved_m + offsets_m @ shrink.T)
 
 
 def nearby_selves(selves: Floats, config: Config) -> Floats:
@@ -210,8 +269,17 @@ def refreshed(
     if is_confirmed and base_level < CONFIRMED_BASE_LEVEL:
         base_level += CONFIRMED_BASE_LEVEL
 
+    names = learned_names(before.names, percept)
+    appearances = before.appearances
+    if percept.appearance is not None:
+        seen = np.asarray(percept.appearance.direction.numpy(), np.float32)[None]
+        sides = seen if appearances is None else np.vstack([appearances.numpy(), seen])
+        appearances = Matrix.of(sides, "<f2")
+
     node = msgspec.structs.replace(
         after,
+        names=names,
+        appearances=appearances,
         function=percept.function or before.function,
         activation=percept.activation,
         base_level=base_level,
@@ -222,6 +290,18 @@ def refreshed(
     )
     place = nearest_place(node.x_m, node.y_m, graph.cell_m(node.map), node.map)
     return [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
+
+
+def learned_names(known: Mapping[str, float], percept: Percept) -> dict[str, float]:
+    """Add the evidence of a percept for names to what is known of an object; what it has for no
+    name counts under the empty name. Only the likeliest names are kept.
+    """
+    seen = distribution(percept)
+    added = {**seen, "": max(0.0, 1.0 - sum(seen.values()))}
+    total = {name: known.get(name, 0.0) + added.get(name, 0.0) for name in {**known, **added}}
+
+    likeliest = sorted(total, key=lambda name: (-total[name], name))[:MAX_NAMES]
+    return {name: total[name] for name in likeliest if total[name] > 0}
 
 
 def _mahalanobis2(positions_m: Floats, selves: Floats, percept: Percept) -> Floats:

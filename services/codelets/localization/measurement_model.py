@@ -26,10 +26,10 @@ FARTHEST_M = 50.0
 # A percept farther from what a sample predicts does not fit it, in standard deviations: of normal
 # errors one in 3,000 is in bearing and range, one in 16,000 in one of them alone.
 GATE = 4.0
-# The share of percepts that may be of another landmark: names that are as good as sure.
+# The share of percepts that may be of another landmark: those that are as good as sure.
 OUTLIER_SHARE = 1e-3
-# The evidence of a name that is as good as sure.
-SURE_EVIDENCE = 0.9
+# The certainty of a percept that is as good as sure to be of its landmark.
+SURE = 0.9
 FULL_TURN_RAD = np.float32(2 * np.pi)
 # Beyond this squared distance densities would be denormal numbers, with which everything is slow.
 MAX_MAHALANOBIS2 = np.float32(150.0)
@@ -39,7 +39,7 @@ class Measurements(NamedTuple):
     """k known landmarks in view: where each is believed to be and where it is seen.
 
     `mean_m` (k, 2) and `covariance_m2` (k, 2, 2) are of the landmark on the map; the rest, (k,)
-    each, of the percept; `evidence` is how likely its name is, by the view alone. A bearing is
+    each, of the percept; `certainty` is how likely it is of that landmark. A bearing is
     unknown if its standard deviation is at least a half turn, a range if it is at least the
     range.
     """
@@ -51,15 +51,15 @@ class Measurements(NamedTuple):
     range_m: Floats
     bearing_sd_rad: Floats
     range_sd_m: Floats
-    evidence: Floats
+    certainty: Floats
 
     @property
     def weights(self) -> Floats:
         """Return how much each counts for or against a pose that it fits or does not fit, (k,), 0
-        to 1: the logarithm of how likely its name is wrong, over that of a sure one.
+        to 1: the logarithm of how likely it is of another landmark, over that of a sure one.
         """
-        doubts = 1 - self.evidence.clip(0.0, SURE_EVIDENCE)
-        weights: Floats = np.log(doubts) / np.log(1 - SURE_EVIDENCE)
+        doubts = 1 - self.certainty.clip(0.0, SURE)
+        weights: Floats = np.log(doubts) / np.log(1 - SURE)
         return weights
 
     @property
@@ -194,7 +194,7 @@ def measurements(
         range_m=np.array([percept.range_m for percept in chosen]),
         bearing_sd_rad=np.array([percept.bearing_sd_rad for percept in chosen]),
         range_sd_m=np.array([percept.range_sd_m for percept in chosen]),
-        evidence=np.array([percept.evidence for percept in chosen]),
+        certainty=np.array([percept.certainty for percept in chosen]),
     )
 
 

@@ -53,7 +53,6 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         id=object_id(percept.label),
         cycle=task.cycle,
         label=percept.label,
-        function=percept.function,
         map=agent.map,
         x_m=agent.x_m,
         y_m=agent.y_m,

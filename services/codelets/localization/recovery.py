@@ -74,7 +74,7 @@ def seen_before(graph: Graph, odometry: Floats, since_ns: float) -> list[Percept
         percept = Percept(
             label=label,
             activation=1.0,
-            evidence=1.0,
+            evidence=0.0,
             bearing_rad=math.atan2(left_m, forwards_m),
             range_m=range_m,
             bearing_sd_rad=min(sd_m / range_m, math.pi),

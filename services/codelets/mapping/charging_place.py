@@ -23,13 +23,12 @@ from cogmap.schemas.nodes import (
     object_id,
 )
 
-LOOK = "charging-place"
+NAME = "charging-place"
+ORIGIN = "charge"
 # From as near, the one that is known charges as well.
 SAME_M = 8.0
 # The standard deviation of how far it stands from the agent that it charges.
 SD_M = 2.0
-# A bound on the labels that are tried.
-MAX_PLACES = 64
 
 
 def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
@@ -49,18 +48,15 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
         return Answer()
 
     answer = Answer()
-    for function in _unexplained(agent, graph):
-        labels = (individual_label(LOOK, number) for number in range(1, MAX_PLACES + 1))
-        label = next((each for each in labels if object_id(each) not in graph.nodes), "")
-        if not label:
-            continue
-
+    for number, function in enumerate(_unexplained(agent, graph)):
+        label = individual_label(task.cycle, number, ORIGIN)
         node = Object(
             id=object_id(label),
             base_level=1.0,
             activation=1.0,
             cycle=task.cycle,
             label=label,
+            names={NAME: 1.0},
             function=function,
             map=agent.map,
             x_m=agent.x_m,

@@ -20,6 +20,7 @@ from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import Operation, Phase
 from cogmap.schemas.nodes import (
+    NEVER_NS,
     LinkKind,
     LoopClosure,
     Object,
@@ -110,6 +111,11 @@ CODELET = Codelet(
 )
 
 
+def is_range_alone(percept: Percept) -> bool:
+    """Decide whether a landmark is seen by its range, without a bearing."""
+    return percept.has_range and not percept.has_bearing
+
+
 def newest_closures(graph: Graph) -> dict[str, LoopClosure]:
     """Find the newest closure by each landmark, and by places, under PLACE_CUE."""
     closures = sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns)
@@ -134,7 +140,12 @@ def _seen_again(
     for percept in known:
         closure = newest.get(percept.label)
         landmark = graph.get(Object, object_id(percept.label))
-        if closure is not None and closure.to_ns > long_ago_ns:
+        if is_range_alone(percept):
+            # Heard all the time: it comes again as the path grows, and never after long.
+            heard_ns = NEVER_NS if landmark is None else landmark.created_ns
+            since_ns = heard_ns if closure is None else closure.to_ns
+            is_again = grows and NEVER_NS < since_ns <= long_ago_ns
+        elif closure is not None and closure.to_ns > long_ago_ns:
             is_again = grows and closure.to_ns <= recently_ns
         else:
             is_again = landmark is not None and 0 <= landmark.last_seen_ns <= long_ago_ns
@@ -150,8 +161,10 @@ def _closure_by_landmark(
 ) -> LoopClosure | None:
     """Make a closure to one of the landmark's observations before; None if these are too few."""
     landmark = graph.get(Object, object_id(percept.label))
-    if landmark is None or not (percept.has_bearing and percept.has_range):
+    if landmark is None or not percept.has_range:
         return None
+    if is_range_alone(percept):
+        return _closure_by_range(percept, task, landmark)
 
     # The pass before ended where `newest` began this one, or the landmark was last seen.
     before_ns, view = landmark.last_seen_ns, 0
@@ -197,4 +210,22 @@ def _closure_by_landmark(
         sd_rad=0.0,
         before_ns=before_ns,
         view=view + 1,
+    )
+
+
+def _closure_by_range(percept: Percept, task: Task, landmark: Object) -> LoopClosure:
+    """Make a closure by all the ranges to a landmark, from where it was heard first."""
+    return LoopClosure(
+        id=f"closure:{task.cycle}:{percept.label}",
+        base_level=1.0,
+        from_ns=max(0, landmark.created_ns),
+        to_ns=task.stamp_ns,
+        cue=percept.label,
+        ahead_m=0.0,
+        left_m=0.0,
+        range_m=percept.range_m,
+        bearing_rad=0.0,
+        sd_m=percept.range_sd_m,
+        sd_rad=0.0,
+        range_alone=True,
     )

@@ -16,10 +16,11 @@ from cogmap.estimation.pose_graph import Constraints, matvec
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import rotation_matrices
 from cogmap.schemas.array import Matrix
-from cogmap.schemas.nodes import ObservationColumn, Observations, observations_id
+from cogmap.schemas.nodes import ObservationColumn, Observations, RangeColumn, observations_id
 from cogmap.schemas.sensing import Percept
 
 COLUMNS = len(ObservationColumn)
+RANGE_COLUMNS = len(RangeColumn)
 STAMP = ObservationColumn.STAMP_S
 WHERE = slice(ObservationColumn.FORWARDS_M, ObservationColumn.LEFT_M + 1)
 SPREAD = slice(ObservationColumn.ALONG_SD_M, ObservationColumn.ACROSS_SD_M + 1)
@@ -51,21 +52,15 @@ class Viewpoint(NamedTuple):
 
 
 def extended(before: Observations | None, viewpoint: Viewpoint, percept: Percept) -> Observations:
-    """Add one more to the observations of a landmark along a path segment."""
-    forwards_m, left_m, turned_rad = viewpoint.step.tolist()
-    direction_rad = turned_rad + percept.bearing_rad
-    range_m = percept.range_m / (1 + viewpoint.range_gain)
-    row = [
-        viewpoint.stamp_s,
-        forwards_m + range_m * math.cos(direction_rad),
-        left_m + range_m * math.sin(direction_rad),
-        percept.range_sd_m,
-        range_m * percept.bearing_sd_rad,
-        direction_rad,
-    ]
-    rows = np.array([row])
-    if before is not None:
-        rows = np.vstack([before.rows.numpy(), rows])
+    """Add one more to the observations of a landmark along a path segment, which has a range, and a
+    bearing or none.
+    """
+    rows = np.zeros((0, COLUMNS)) if before is None else before.rows.numpy()
+    ranges = _ranges_of(before)
+    if percept.has_bearing:
+        rows = np.vstack([rows, _sighting(viewpoint, percept)])
+    else:
+        ranges = np.vstack([ranges, _range_alone(viewpoint, percept)])
 
     return Observations(
         id=observations_id(viewpoint.number, percept.label),
@@ -73,6 +68,7 @@ def extended(before: Observations | None, viewpoint: Viewpoint, percept: Percept
         number=viewpoint.number,
         landmark=percept.label,
         rows=Matrix.of(rows),
+        ranges=Matrix.of(ranges) if len(ranges) else None,
     )
 
 
@@ -81,7 +77,43 @@ def is_observed_from(observations: Observations | None, stamp_s: float) -> bool:
     if observations is None:
         return False
 
-    return float(observations.rows.numpy()[-1, STAMP]) >= stamp_s
+    seen_s = observations.rows.numpy()[-1:, STAMP].tolist()
+    heard_s = _ranges_of(observations)[-1:, STAMP].tolist()
+    newest_s: float = max(seen_s + heard_s)
+    return newest_s >= stamp_s
+
+
+def cauchy_weights(squared: Floats) -> Floats:
+    """Compute how much each observation counts by its squared deviation, in variances."""
+    weights: Floats = 1 / (1 + squared / DOUBTED**2)
+    return weights
+
+
+def _sighting(viewpoint: Viewpoint, percept: Percept) -> list[float]:
+    forwards_m, left_m, turned_rad = viewpoint.step.tolist()
+    direction_rad = turned_rad + percept.bearing_rad
+    range_m = percept.range_m / (1 + viewpoint.range_gain)
+    return [
+        viewpoint.stamp_s,
+        forwards_m + range_m * math.cos(direction_rad),
+        left_m + range_m * math.sin(direction_rad),
+        percept.range_sd_m,
+        range_m * percept.bearing_sd_rad,
+        direction_rad,
+    ]
+
+
+def _range_alone(viewpoint: Viewpoint, percept: Percept) -> list[float]:
+    """Return a row as RangeColumn; the gain of ranges alone is estimated with the landmarks."""
+    forwards_m, left_m, _ = viewpoint.step.tolist()
+    return [viewpoint.stamp_s, forwards_m, left_m, percept.range_m, percept.range_sd_m]
+
+
+def _ranges_of(observations: Observations | None) -> Floats:
+    """Return the (m, 5) rows of the ranges alone."""
+    if observations is None or observations.ranges is None:
+        return np.zeros((0, RANGE_COLUMNS))
+    return observations.ranges.numpy()
 
 
 class Sightings(NamedTuple):
@@ -98,7 +130,7 @@ class Sightings(NamedTuple):
     @classmethod
     def of(cls, observations: Iterable[Observations], stamps_s: Floats) -> Sightings:
         """Gather the observations made from the places of the path at `stamps_s`, (n,)."""
-        records = list(observations)
+        records = [record for record in observations if len(record.rows.numpy())]
         labels = tuple(sorted({record.landmark for record in records}))
         number_of = {label: number for number, label in enumerate(labels)}
 
@@ -133,8 +165,7 @@ class Sightings(NamedTuple):
         residual_m = np.einsum("mba,mb->ma", turn, offset_m) - self.where_m
         squared = np.einsum("ma,mab,mb->m", residual_m, self.information, residual_m)
 
-        weights: Floats = 1 / (1 + squared / DOUBTED**2)
-        return weights
+        return cauchy_weights(squared)
 
     def landmarks_m(self, poses: Floats) -> Floats:
         """Estimate where the landmarks are most likely, (k, 2), if the path is at (n, 3) `poses`:

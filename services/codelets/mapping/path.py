@@ -99,7 +99,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         range_gain=agent.range_gain,
     )
     for percept in task.percepts:
-        if not (percept.has_range and percept.has_bearing):
+        if not percept.has_range:
             continue
 
         before = _observations(graph, number, percept.label)

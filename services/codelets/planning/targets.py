@@ -11,6 +11,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.graph.graph import Graph
+from cogmap.graph.individuals import called
 from cogmap.schemas.graph import DropNode, Operation
 from cogmap.schemas.nodes import (
     NEVER_NS,
@@ -22,7 +23,6 @@ from cogmap.schemas.nodes import (
     PlanState,
     Self,
     need_id,
-    object_id,
 )
 from cogmap.services.codelets.planning.config import Config
 from cogmap.services.codelets.planning.network import Cell
@@ -141,13 +141,13 @@ def target_of(goal: Goal, graph: Graph, agent: Self, costs: PlaceCosts, config: 
 
 def _objects_of(goal: Goal, graph: Graph, agent: Self) -> list[Object]:
     """Return the objects at which a goal is reached."""
-    named = graph.get(Object, object_id(goal.object))
+    named = called(goal.object, graph)
     function = SATISFIED_BY.get(goal.need)
-    if named is None or function is None:
-        return [] if named is None else [named]
+    if not named or function is None:
+        return named
 
     satisfying = [node for node in graph.of_kind(Object) if node.function == function]
-    return [node for node in satisfying if node.map == agent.map] or [named]
+    return [node for node in satisfying if node.map == agent.map] or named
 
 
 def nearest_free(

@@ -8,7 +8,7 @@ import msgspec
 
 from cogmap.schemas.cognition import Broadcast
 from cogmap.schemas.feelings import Feeling
-from cogmap.schemas.nodes import Object, category_id, feeling_id, look_of, map_number, object_id
+from cogmap.schemas.nodes import Object, category_id, feeling_id, map_number, name_id
 from cogmap.schemas.sensing import Associations, Percept
 from cogmap.services.epam.association.graph import AssociativeGraph
 from cogmap.services.epam.association.prior import Prior
@@ -81,7 +81,7 @@ class Primer:
         """Return `percept` with the feelings that its PAM node activates; if the object was never
         conscious, those of its category.
         """
-        name = object_id(look_of(percept.label))
+        name = name_id(percept.name)
         if name not in self._graph:
             name = category_id(percept.function)
 
@@ -109,7 +109,8 @@ def nodes_of(broadcast: Broadcast) -> list[str]:
         is_missing = is_surprise and node.salience < 0
         if not isinstance(node, Object) or is_missing:
             continue
-        names[object_id(look_of(node.label))] = None
+        if node.look:
+            names[name_id(node.look)] = None
         if node.function:
             names[category_id(node.function)] = None
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from cogmap.schemas.nodes import object_id
+from cogmap.schemas.nodes import name_id
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ class Prior:
 
     def log_ratio(self, labels: Iterable[str]) -> Floats:
         """Return how much likelier each label is than if none were primed, as a logarithm, (n,)."""
-        spread = np.array([self.primed.get(object_id(label), 0.0) for label in labels])
+        spread = np.array([self.primed.get(name_id(label), 0.0) for label in labels])
         expected = spread / max(1.0, float(spread.sum()))
         return np.log1p(self.share * len(spread) * expected)
 

@@ -9,19 +9,20 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from cogmap.schemas.cognition import Relation
-from cogmap.schemas.nodes import Side, object_id, relation_id
+from cogmap.schemas.nodes import Side, name_id, relation_id
 
 
 def related(relations: Iterable[Relation]) -> dict[str, str]:
     """Return the relations between objects in these `relations` to the agent, each with the PAM
     node of the object that stands in it.
     """
-    from_left = sorted(relations, key=lambda each: (-each.bearing_rad, each.range_m))
+    named = [each for each in relations if each.look]
+    from_left = sorted(named, key=lambda each: (-each.bearing_rad, each.range_m))
 
     standing = {}
     for left, right in pairwise(from_left):
-        standing[relation_id(Side.LEFT_OF, right.look)] = object_id(left.look)
-        standing[relation_id(Side.RIGHT_OF, left.look)] = object_id(right.look)
+        standing[relation_id(Side.LEFT_OF, right.look)] = name_id(left.look)
+        standing[relation_id(Side.RIGHT_OF, left.look)] = name_id(right.look)
 
     return standing
 

@@ -1,15 +1,17 @@
-"""Fits an object's learned footprint to the walls that are seen, which gives its centre.
+"""Fits an object's footprint to the walls that are seen, which gives its centre and its sides.
 
-A rectangle of known sides has three unknowns: its centre (x right, z forward of the camera) and its
-orientation. It is fitted to the disparity of each column and to the columns where the object truly
-begins and ends, by damped least squares (Levenberg 1944, Marquardt 1963) from several orientations
-at once. So the centre does not depend on which walls are in view, and the fit has a covariance;
-orientations that fit about equally well are averaged by their likelihood.
+A rectangle has five unknowns: its centre (x right, z forward of the camera), its orientation, and
+its sides, of which it is known what to expect. It is fitted to the disparity of each column and to
+the columns where the object truly begins and ends, by damped least squares (Levenberg 1944,
+Marquardt 1963) from several orientations at once. So the centre does not depend on which walls are
+in view, and the fit has a covariance; orientations that fit about equally well are averaged by
+their likelihood.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +20,7 @@ from cogmap.schemas.sensing import Calibration
 from cogmap.services.epam.layout.footprint_model import (
     COLUMNS,
     MIN_RANGE_M,
+    PARAMETERS,
     FootprintProblem,
     linearized,
 )
@@ -32,22 +35,24 @@ CORRELATED_COLUMNS = 5
 # Of a column's median, of what all columns of an object share, and of what is shared in addition
 # when it has but one column.
 DISPARITY_SD_PX = 0.14
-DISPARITY_BIAS_SD_PX = 0.03
+DISPARITY_BIAS_SD_PX = 0.07
 NARROW_BIAS_PX = 0.4
 # Residuals beyond it, in standard deviations, count linearly.
 HUBER = 1.5
 MIN_BEARING_SD_RAD = 0.003
 MIN_RANGE_SD_M = 0.1
 HIDDEN_SD_M = 0.2
-# Largest step of one iteration: x and z in metres, orientation in radians.
-MAX_STEP = np.array([5, 5, 0.4])
+# Largest step of one iteration: x and z in metres, orientation in radians, half sides in metres.
+MAX_STEP = np.array([5, 5, 0.4, 1, 1])
+# What is known of the parameters beside, as information: next to nothing.
+PRIOR = np.diag([1e-4, 1e-4, 1e-2, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
 class Silhouette:
     """The visible part of an object: columns (n,) and their disparities in pixels (n,), the first
     and the last column, and whether the object truly begins and ends there or something else hides
-    the rest; `sides_m` are those of its footprint.
+    the rest; `sides_m` are those of its footprint, known to `sides_sd_m`.
     """
 
     columns: Floats
@@ -57,12 +62,13 @@ class Silhouette:
     left_true: bool
     right_true: bool
     sides_m: tuple[float, float]
+    sides_sd_m: tuple[float, float]
 
 
 @dataclass(frozen=True)
 class ObjectPose:
     """An object's centre in the robot's frame, with standard deviations; `misfit` is the root mean
-    square of the disparity residuals, in standard deviations.
+    square of the disparity residuals, in standard deviations. `width_m` is the mean of its sides.
     """
 
     bearing_rad: float
@@ -70,12 +76,22 @@ class ObjectPose:
     bearing_sd_rad: float
     range_sd_m: float
     misfit: float
+    width_m: float
+
+    def blurred(self, sd_m: float) -> ObjectPose:
+        """Return the pose with an error of that standard deviation more, in either direction."""
+        across_sd_m = math.hypot(self.range_m * self.bearing_sd_rad, sd_m)
+        return replace(
+            self,
+            bearing_sd_rad=across_sd_m / self.range_m,
+            range_sd_m=math.hypot(self.range_sd_m, sd_m),
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class _Solution:
-    """Fitted x_m, z_m, orientation_rad (s, 3), weighted residuals (s, r), normal matrices
-    (s, 3, 3), and the gradient of a common disparity bias (s, 3).
+    """Fitted parameters (s, PARAMETERS), weighted residuals (s, r), normal matrices (s, PARAMETERS,
+    PARAMETERS), and the gradient of a common disparity bias (s, PARAMETERS).
     """
 
     parameters: Floats
@@ -100,9 +116,9 @@ def locate(silhouettes: list[Silhouette], camera: Calibration) -> list[ObjectPos
     misfits = np.asarray(rms_px / DISPARITY_SD_PX)
 
     shape = (len(silhouettes), ORIENTATIONS)
-    parameters = solution.parameters.reshape(*shape, 3)
+    parameters = solution.parameters.reshape(*shape, PARAMETERS)
     costs = (solution.residuals**2).sum(1).reshape(shape)
-    covariances = _covariances(solution, problem).reshape(*shape, 3, 3)
+    covariances = _covariances(solution, problem).reshape(*shape, PARAMETERS, PARAMETERS)
     least_misfits = misfits.reshape(shape).min(1)
 
     return [
@@ -133,6 +149,7 @@ def _stacked(silhouettes: list[Silhouette], camera: Calibration) -> FootprintPro
         edge_px=np.array(edges_px),
         hidden=~np.array(true_ends),
         half_m=np.array(sides_m) / 2,
+        half_sd_m=np.array([each.sides_sd_m for each in silhouettes]) / 2,
         sd_px=DISPARITY_SD_PX * np.sqrt(redundancy),
         bias_sd_px=DISPARITY_BIAS_SD_PX + NARROW_BIAS_PX / width_px,
         camera=camera,
@@ -140,7 +157,9 @@ def _stacked(silhouettes: list[Silhouette], camera: Calibration) -> FootprintPro
 
 
 def _starts(objects: FootprintProblem) -> Floats:
-    """Place ORIENTATIONS starts an object, (s * ORIENTATIONS, 3), behind the seen wall's middle."""
+    """Place ORIENTATIONS starts an object, (s * ORIENTATIONS, PARAMETERS), behind the middle of the
+    wall that is seen, with the sides that are expected.
+    """
     camera = objects.camera
     right_px = objects.edge_px.mean(1) - camera.cx_px
     slope = np.asarray(right_px / camera.fx_px)
@@ -157,7 +176,8 @@ def _starts(objects: FootprintProblem) -> Floats:
     starts = np.repeat(centre, ORIENTATIONS, axis=0)
     starts[:, 2] = np.tile(orientations, len(centre))
     starts[:, 2] -= np.repeat(np.arctan(slope), ORIENTATIONS)
-    return starts
+    halves_m = np.repeat(objects.half_m, ORIENTATIONS, axis=0)
+    return np.concatenate([starts, halves_m], axis=1)
 
 
 def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
@@ -172,7 +192,7 @@ def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
         weighted, normal = _weighted_normal(jacobian, _huber_weight(residuals))
         gradient = np.einsum("sri,sr->si", weighted, residuals)
         added = np.einsum("sii->si", normal) * damping[:, None] + 1e-9
-        damped = normal + added[:, :, None] * np.eye(3)
+        damped = normal + added[:, :, None] * np.eye(PARAMETERS)
         step = np.linalg.solve(damped, gradient[..., None])[..., 0]
 
         candidate = best - step.clip(-MAX_STEP, MAX_STEP)
@@ -201,7 +221,9 @@ def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:
 
 
 def _weighted_normal(jacobian: Floats, weight: Floats) -> tuple[Floats, Floats]:
-    """Weight the derivatives (s, r, 3) by (s, r), and compute the normal matrices (s, 3, 3)."""
+    """Weight the derivatives (s, r, PARAMETERS) by (s, r), and compute the normal matrices (s,
+    PARAMETERS, PARAMETERS).
+    """
     weighted = jacobian * weight[..., None]
     normal = np.einsum("sri,srj->sij", weighted, jacobian)
     return weighted, np.asarray(normal)
@@ -221,11 +243,10 @@ def _huber_cost(residuals: Floats) -> Floats:
 
 
 def _covariances(solution: _Solution, problem: FootprintProblem) -> Floats:
-    """Add up the covariances (s, 3, 3) of independent errors, of a bias that all disparities share,
-    and of the centre if an edge is hidden.
+    """Add up the covariances (s, PARAMETERS, PARAMETERS) of independent errors, of a bias that all
+    disparities share, and of the centre if an edge is hidden.
     """
-    prior = np.diag([1e-4, 1e-4, 1e-2])
-    independent = np.linalg.inv(solution.normal + prior)
+    independent = np.linalg.inv(solution.normal + PRIOR)
 
     common = np.einsum("sij,sj->si", independent, solution.bias_gradient)
     covariances = np.asarray(independent + _outer(common))
@@ -271,4 +292,5 @@ def _mean_pose(
         bearing_sd_rad=float(np.hypot(bearing_sd_rad, MIN_BEARING_SD_RAD)),
         range_sd_m=float(np.hypot(range_sd_m, MIN_RANGE_SD_M)),
         misfit=float(misfit),
+        width_m=float(2 * (weight @ parameters[:, 3:]).mean()),
     )

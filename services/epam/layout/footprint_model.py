@@ -1,5 +1,5 @@
 """The measurement model of a footprint fit: the disparities and edges that a rectangle at a pose
-predicts for the columns of a view, and their residuals.
+predicts for the columns of a view, what is expected of its sides, and the residuals of both.
 """
 
 from __future__ import annotations
@@ -18,8 +18,12 @@ COLUMNS = 20
 EDGE_SD_PX = 1.2
 # What is nearer counts as being here, so that nothing is divided by 0.
 MIN_RANGE_M = 0.5
-# Of differences: x and z in metres, orientation in radians.
-STEPS = (1e-3, 1e-3, 1e-4)
+# Of a fit: x and z in metres, orientation in radians, and half of either side in metres.
+PARAMETERS = 5
+# Of differences of these.
+STEPS = (1e-3, 1e-3, 1e-4, 1e-3, 1e-3)
+# A footprint has sides, however little is seen of it.
+MIN_HALF_M = 1.0
 
 # Of the corners of a rectangle, along its two axes.
 CORNER_SIGNS_A = np.array([1, 1, -1, -1])
@@ -29,7 +33,8 @@ CORNER_SIGNS_B = np.array([1, -1, 1, -1])
 @dataclass(frozen=True, eq=False)
 class FootprintProblem:
     """s stacked silhouettes: ray slopes and disparities (s, COLUMNS), edge columns and whether each
-    is hidden (s, 2), half sides (s, 2), standard deviations of disparity and of its bias (s,).
+    is hidden (s, 2), half sides as they are expected, and the standard deviations of that (s, 2),
+    standard deviations of disparity and of its bias (s,).
     """
 
     slope: Floats
@@ -37,6 +42,7 @@ class FootprintProblem:
     edge_px: Floats
     hidden: Booleans
     half_m: Floats
+    half_sd_m: Floats
     sd_px: Floats
     bias_sd_px: Floats
     camera: Calibration
@@ -49,6 +55,7 @@ class FootprintProblem:
             self.edge_px[rows],
             self.hidden[rows],
             self.half_m[rows],
+            self.half_sd_m[rows],
             self.sd_px[rows],
             self.bias_sd_px[rows],
             self.camera,
@@ -63,8 +70,11 @@ class FootprintProblem:
 
 
 def _residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
-    """Compute the (s, COLUMNS + 2) residuals, in standard deviations, of (s, 3) parameters."""
+    """Compute the residuals of disparities, edges and sides, (s, COLUMNS + 4), in standard
+    deviations, of (s, PARAMETERS) parameters.
+    """
     camera = problem.camera
+    half_m = np.maximum(parameters[:, 3:], MIN_HALF_M)
     focal_baseline = camera.fx_px * camera.baseline_m
     disparity_px = focal_baseline * _inverse_depths(parameters, problem)
     error_px = disparity_px - problem.disparity_px
@@ -73,9 +83,9 @@ def _residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
 
     # From each edge to the outermost corner of the rectangle. The true end at a hidden edge may lie
     # anywhere farther out.
-    x, z, orientation = parameters.T[:, :, None]
-    a = problem.half_m[:, :1] * CORNER_SIGNS_A
-    b = problem.half_m[:, 1:] * CORNER_SIGNS_B
+    x, z, orientation = parameters[:, :3].T[:, :, None]
+    a = half_m[:, :1] * CORNER_SIGNS_A
+    b = half_m[:, 1:] * CORNER_SIGNS_B
     cos = np.cos(orientation)
     sin = np.sin(orientation)
     corner_x = x + a * cos - b * sin
@@ -89,18 +99,20 @@ def _residuals(parameters: Floats, problem: FootprintProblem) -> Floats:
     outward_px = error_px * np.array([-1.0, 1.0])
     is_free = problem.hidden & (outward_px > 0)
     of_edges = np.where(is_free, 0.0, error_px) / EDGE_SD_PX
-    return np.concatenate([of_columns, of_edges], axis=1)
+    of_sides = (parameters[:, 3:] - problem.half_m) / problem.half_sd_m
+    return np.concatenate([of_columns, of_edges, of_sides], axis=1)
 
 
 def _inverse_depths(parameters: Floats, problem: FootprintProblem) -> Floats:
     """Return 1 / depth in metres, (s, COLUMNS), where the rays meet sides that face the camera."""
-    x, z, orientation = parameters.T
+    x, z, orientation = parameters[:, :3].T
+    halves_m = np.maximum(parameters[:, 3:], MIN_HALF_M)
     cos = np.cos(orientation)
     sin = np.sin(orientation)
 
     inverse = np.full(problem.slope.shape, np.inf)
     axes = ((cos, sin), (-sin, cos))
-    for (axis_x, axis_z), half_m in zip(axes, problem.half_m.T, strict=True):
+    for (axis_x, axis_z), half_m in zip(axes, halves_m.T, strict=True):
         along_m = x * axis_x + z * axis_z
         gap_m = np.abs(along_m) - half_m
 
@@ -118,8 +130,8 @@ def _inverse_depths(parameters: Floats, problem: FootprintProblem) -> Floats:
 
 
 def linearized(parameters: Floats, copies: FootprintProblem) -> tuple[Floats, Floats]:
-    """Compute residuals (s, r) and their derivatives (s, r, 3), by forward differences, of (s, 3)
-    `parameters` and the copies of their problem.
+    """Compute residuals (s, r) and their derivatives (s, r, PARAMETERS), by forward differences, of
+    (s, PARAMETERS) `parameters` and the copies of their problem.
     """
     evaluated = [parameters]
     for axis, step in enumerate(STEPS):

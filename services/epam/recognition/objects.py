@@ -10,7 +10,7 @@ shows a building at all.
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterable
+from collections.abc import Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +22,8 @@ import numpy.typing as npt
 
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Bytes, Floats, Singles
+from cogmap.schemas.array import Array
+from cogmap.schemas.sensing import Appearance as PublishedAppearance
 from cogmap.schemas.sensing import Calibration
 from cogmap.services.epam.config import Processor
 from cogmap.services.epam.network import WEIGHTS, Network
@@ -34,10 +36,6 @@ DIMENSIONS = 64
 BATCH = 4
 INPUT_SHAPE = (BATCH, CHANNELS, SIDE_PX, SIDE_PX)
 OUTPUT_SHAPES = {"embedding": (BATCH, DIMENSIONS), "odds": (BATCH, 2)}
-# A bound on what one learned building costs.
-MAX_APPEARANCES = 8
-# Appearances with a higher cosine are the same one.
-SAME_COSINE = 0.9
 FIELDS_IN_FILE = {"novel_sharpness": "met_sharpness", "novel_unknown": "met_unknown"}
 
 
@@ -88,8 +86,8 @@ class Recognition:
     """The likeliest `label` with its posterior `activation`, which is with the prior.
 
     As far as the view alone goes, `evidence` is the posterior of the label, beside the
-    probabilities of an `unknown` building and of `background`. `size_m` is None unless the label
-    was taught and has more evidence than those two.
+    probabilities of an `unknown` building and of `background`; `names` are those of all labels.
+    `size_m` is None unless the label has more evidence than those two.
     """
 
     label: str
@@ -97,6 +95,7 @@ class Recognition:
     evidence: float
     unknown: float
     background: float
+    names: dict[str, float]
     appearance: Appearance
     size_m: tuple[float, float, float] | None = None
 
@@ -109,17 +108,12 @@ class Recognition:
 
 
 class ObjectRecognizer:
-    """Recognizes segments one by one, among what was taught and what was learned since."""
+    """Recognizes segments one by one, among what was taught."""
 
     def __init__(self, network: Network, prototypes: Prototypes) -> None:
         self._network = network
         self._prototypes = prototypes
         self._directions = np.asarray(prototypes.directions, np.float32)
-
-        # Of each learned label, its number among these; and of each embedding that of its label.
-        self._number_of: dict[str, int] = {}
-        self._numbers = np.empty(0, np.int64)
-        self._embeddings = np.empty((0, DIMENSIONS), np.float32)
 
     def begin(
         self, image: Bytes, depth_m: Singles, segments: list[Segment], camera: Calibration
@@ -151,36 +145,17 @@ class ObjectRecognizer:
 
     @property
     def labels(self) -> list[str]:
-        """Return all labels that a segment may be recognized as: taught ones, then learned ones."""
-        return [*self._prototypes.names, *self._number_of]
+        """Return all labels that a segment may be recognized as."""
+        return self._prototypes.names
 
-    def is_taught(self, label: str) -> bool:
-        """Return true if the label was taught, not learned since."""
-        return label in self._prototypes.names
-
-    def recognize(
-        self,
-        appearance: Appearance,
-        excluded: Container[str] = (),
-        log_prior: Floats | float = 0.0,
-    ) -> Recognition:
-        """Return the recognition of a segment with this `appearance`, as none of the labels
-        `excluded`.
+    def recognize(self, appearance: Appearance, log_prior: Floats | float = 0.0) -> Recognition:
+        """Return the recognition of a segment with this `appearance`.
 
         `log_prior`: how much likelier each of `labels` was before the view, as a logarithm.
         """
         labels = self.labels
-        taught = len(self._prototypes.names)
-
-        # The cosine with a learned label is that with its most similar embedding.
-        novel_cosines = np.full(len(self._number_of), np.float32(-1.0))
-        np.maximum.at(novel_cosines, self._numbers, self._embeddings @ appearance.embedding)
-
-        is_excluded = np.array([label in excluded for label in labels])
-        log_odds = _log_odds(
-            self._directions @ appearance.embedding, novel_cosines, self._prototypes
-        )
-        possible: Floats = np.where(is_excluded, -np.inf, log_odds)
+        none = np.empty(0, np.float32)
+        possible = _log_odds(self._directions @ appearance.embedding, none, self._prototypes)
 
         *seen, unknown, background = _posteriors(possible, appearance.building).tolist()
         expected = _posteriors(possible + log_prior, appearance.building)
@@ -188,7 +163,7 @@ class ObjectRecognizer:
         evidence = min(seen[best], 1.0)
 
         size_m = None
-        if evidence > unknown + background and best < taught:
+        if evidence > unknown + background:
             size_m = self._prototypes.size_m[best]
 
         return Recognition(
@@ -197,36 +172,25 @@ class ObjectRecognizer:
             evidence=evidence,
             unknown=unknown,
             background=background,
+            names={name: min(value, 1.0) for name, value in zip(labels, seen, strict=True)},
             appearance=appearance,
             size_m=size_m,
         )
 
-    def learn(self, label: str, embedding: Singles) -> None:
-        """Recognize from now on what is similar to `embedding` as `label`."""
-        number = self._number_of.setdefault(label, len(self._number_of))
-        self._numbers = np.append(self._numbers, number)
-        self._embeddings = np.concatenate([self._embeddings, embedding[None]])
-
-    def is_new_appearance(self, recognition: Recognition) -> bool:
-        """Return true if a learned building differs from every appearance of it that was learned,
-        and has fewer than MAX_APPEARANCES.
+    def published(self, appearance: Appearance) -> PublishedAppearance:
+        """Return an appearance as others compare it with further ones: what was met once is
+        recognized by its cosine with that.
         """
-        embedding = recognition.appearance.embedding
-        number = self._number_of.get(recognition.label, -1)
-        cosines = [known @ embedding for known in self._embeddings[self._numbers == number]]
-        return 0 < len(cosines) < MAX_APPEARANCES and bool(max(cosines) < SAME_COSINE)
+        return PublishedAppearance(
+            direction=Array.of(appearance.embedding, "<f4"),
+            sharpness=self._prototypes.novel_sharpness,
+            even_cosine=self._prototypes.novel_unknown,
+        )
 
     @property
     def sizes_m(self) -> dict[str, tuple[float, float, float]]:
         """Return each taught label's footprint sides, the longer first, and height."""
         return dict(zip(self._prototypes.names, self._prototypes.size_m, strict=True))
-
-    @property
-    def learned(self) -> list[tuple[str, Singles]]:
-        """Return every label and embedding learned since the teaching, in order."""
-        labels = list(self._number_of)
-        names = [labels[number] for number in self._numbers.tolist()]
-        return list(zip(names, self._embeddings, strict=True))
 
 
 def load(path: Path = DEFAULT_PATH, processor: Processor = "cpu") -> ObjectRecognizer:

@@ -56,7 +56,9 @@ class Walls:
         """Return the column in the middle of the segment."""
         return (self.left + self.right) / 2
 
-    def silhouette(self, sides_m: tuple[float, float]) -> Silhouette:
+    def silhouette(
+        self, sides_m: tuple[float, float], sides_sd_m: tuple[float, float]
+    ) -> Silhouette:
         """Return the input of a footprint's fit, without the columns at each end whose depth mixes
         two objects.
         """
@@ -84,6 +86,7 @@ class Walls:
             left_true=self.left_true,
             right_true=self.right_true,
             sides_m=sides_m,
+            sides_sd_m=sides_sd_m,
         )
 
     def usual_pose(self, camera: Calibration) -> ObjectPose:
@@ -105,6 +108,7 @@ class Walls:
             bearing_sd_rad=float(lateral_sd_m / range_m),
             range_sd_m=float(np.hypot(USUAL_SD_M, 0.05 * range_m)),
             misfit=0.0,
+            width_m=2 * USUAL_HALF_M,
         )
 
     def width_m(self, camera: Calibration) -> float:

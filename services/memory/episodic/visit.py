@@ -16,7 +16,6 @@ from cogmap.schemas.nodes import (
     Remembered,
     goal_id,
     kind_of,
-    look_of,
 )
 from cogmap.services.memory.episodic.encoding import PLACE_M
 
@@ -102,8 +101,8 @@ def name_of(node: AnyNode) -> Name | None:
     the self, which is in all.
     """
     match node:
-        case Object(label=label):
-            return kind_of(node), look_of(label)
+        case Object():
+            return kind_of(node), node.look or node.label
         case Need(label=label):
             return kind_of(node), label
         case Goal(object=label):

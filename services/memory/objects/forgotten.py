@@ -26,8 +26,6 @@ from cogmap.schemas.nodes import (
     Object,
     RecalledColumn,
     Recollection,
-    individual_label,
-    look_of,
     object_id,
 )
 from cogmap.services.memory.config import MIN_SIGHTINGS
@@ -130,9 +128,7 @@ class ForgottenObjects:
             if is_same(kept, node):
                 del self._forgotten[label]
 
-        namesake = self._forgotten.pop(node.label, None)
-        if namesake is not None:
-            self._put(namesake)
+        self._forgotten.pop(node.label, None)
 
     def _drop(self, name: str, has_decayed: bool) -> None:
         node = self._present.pop(name, None)
@@ -151,17 +147,9 @@ class ForgottenObjects:
         return node.sightings >= MIN_SIGHTINGS
 
     def _put(self, node: Object) -> None:
-        """Keep an object under its label, or the first that is free."""
-        label = node.label
-        number = 0
-        while object_id(label) in self._graph.nodes or label in self._forgotten:
-            number += 1
-            label = individual_label(look_of(label), number)
-
+        """Keep an object, as well known as one that was learned."""
         level = max(node.base_level, LEARNED_BASE_LEVEL)
-        self._forgotten[label] = msgspec.structs.replace(
-            node, id=object_id(label), label=label, base_level=level
-        )
+        self._forgotten[node.label] = msgspec.structs.replace(node, base_level=level)
 
     def _enter(self, frame: str) -> None:
         """Follow the root map into the frame of the recalled map of that name, which was joined to
@@ -190,10 +178,15 @@ def _objects_of(stored: StoredObjects) -> list[Object]:
     """Return the objects of a record. How well each was known is not stored."""
     objects = []
     rows = np.asarray(stored.objects.numpy(), np.float64).tolist()
-    for label, function, row in zip(stored.labels, stored.functions, rows, strict=True):
+    known = zip(
+        stored.labels, stored.names, stored.given_names, stored.functions, rows, strict=True
+    )
+    for label, name, given_name, function, row in known:
         node = Object(
             id=object_id(label),
             label=label,
+            names={name: max(1.0, row[RecalledColumn.SIGHTINGS])},
+            given_name=given_name,
             function=function,
             x_m=row[RecalledColumn.X_M],
             y_m=row[RecalledColumn.Y_M],

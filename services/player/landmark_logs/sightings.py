@@ -14,11 +14,14 @@ def sighting(
     range_sd_m: float,
     width_m: float = 0.0,
 ) -> Percept:
-    """Make the percept of a landmark, recognised for certain as what `label` calls it."""
+    """Make the percept of a landmark. Its label says which one it is, as a barcode does; without
+    one, that is to be found out.
+    """
     return Percept(
+        name=label,
         label=label,
         activation=1.0,
-        evidence=1.0,
+        evidence=1.0 if label else 0.0,
         bearing_rad=bearing_rad,
         range_m=range_m,
         bearing_sd_rad=bearing_sd_rad,

@@ -19,8 +19,8 @@ from cogmap.services.player.landmark_logs.views import LandmarkLog, notes_of_ord
 from cogmap.services.player.landmark_logs.wheels import Wheels
 from cogmap.services.player.recording import poses_of
 
-LABEL = "tree"
-"""What every trunk is: nothing says which tree it is."""
+NO_LABEL = ""
+"""Nothing says which tree a trunk is of: that is to be found out."""
 
 RANGE_SD_M = 0.3
 BEARING_SD_RAD = float(np.deg2rad(1.0))
@@ -86,7 +86,7 @@ def _percept(row: Floats) -> Percept:
     """Make a percept of a trunk (stamp, range, bearing, diameter), seen from the rear axle."""
     _, range_m, bearing_rad, diameter_m = row.tolist()
     return sighting(
-        LABEL,
+        NO_LABEL,
         bearing_rad,
         range_m,
         bearing_sd_rad=BEARING_SD_RAD,

@@ -13,7 +13,6 @@ import numpy as np
 from cogmap.errors import ConfigError
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import transform_to
-from cogmap.graph.individuals import APART_M
 from cogmap.services.sim.layout.boundaries import clearance_m, surfaces
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE, Prop
 from cogmap.services.sim.layout.place import Place
@@ -27,7 +26,7 @@ JUNCTION_M = 8.0
 # From any wall at least.
 WALL_M = 1.0
 # Objects that stand nearer to one another than buildings are taken for one.
-BUILDING_M = APART_M + 0.5
+BUILDING_M = 6.5
 # From props, and from other posts at least.
 PROP_M = 3.5
 POST_M = 15.0

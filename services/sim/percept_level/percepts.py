@@ -184,7 +184,7 @@ class PerceptSim:
         noisy_range_m = float(self._rng.normal(range_m, range_sd_m))
 
         return Percept(
-            label=label,
+            name=label,
             activation=errors.right_name,
             evidence=errors.right_name,
             bearing_rad=math.remainder(noisy_bearing_rad, math.tau),

@@ -85,7 +85,7 @@ class Feeder:
         x_m = BUILDING_M[0] - self.driven_m()
         y_m = BUILDING_M[1]
         return Percept(
-            label="building-01",
+            name="building-01",
             activation=0.9,
             evidence=0.9,
             bearing_rad=float(np.arctan2(y_m, x_m)),

@@ -23,6 +23,7 @@ from cogmap.schemas.nodes import (
     Map,
     Misfits,
     Object,
+    individual_label,
     object_id,
 )
 from cogmap.services.memory.episodic.config import EpisodicConfig
@@ -44,11 +45,22 @@ def config(episodic: EpisodicConfig = EPISODIC, **facts: Any) -> Config:
 
 
 def seen(*looks: str, salience: float = 0.0) -> list[AnyNode]:
-    """Objects that are conscious."""
-    return [
-        Object(id=object_id(look), label=look, x_m=0.0, y_m=0.0, salience=salience)
-        for look in looks
-    ]
+    """Objects that are conscious, one of each of these looks."""
+    nodes: list[AnyNode] = []
+    for number, look in enumerate(looks):
+        label = individual_label(41, number)
+        nodes.append(
+            Object(
+                id=object_id(label),
+                label=label,
+                names={look: 1.0},
+                x_m=0.0,
+                y_m=0.0,
+                salience=salience,
+            )
+        )
+
+    return nodes
 
 
 class Mind:

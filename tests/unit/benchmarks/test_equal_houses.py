@@ -34,5 +34,5 @@ def test_what_was_seen_so_far_is_known() -> None:
     at_m = np.array([[10.0, 8.0], [60.0, 8.0], [30.0, 8.0]])
     seen = Walk(FIRST, np.zeros((100, 2)), ["house", "works", "house"], at_m, np.array([0, 40, 20]))
 
-    assert [node.label for node in seen.objects(20)] == ["house", "house~3"]
+    assert [node.name for node in seen.objects(20)] == ["house", "house"]
     assert len(seen.objects(40)) == 3

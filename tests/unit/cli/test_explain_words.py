@@ -22,7 +22,6 @@ from cogmap.schemas.nodes import (
     GraphNode,
     Map,
     Node,
-    Object,
     Plan,
     PlanState,
     Remembered,
@@ -32,12 +31,15 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.schemas.sensing import MotorCommand, SpeedLimit
 from cogmap.services.global_workspace.config import Config
+from cogmap.testing import landmark
 from tests.support.cycles import AGENT, Cycles, action, coalition, delta, percept
 from tests.support.logs import write_log
 
 NODES: list[tuple[GraphNode, str]] = [
     (AGENT, "the agent at (3.0, -1.0) m, heading 0°"),
-    (Object(id="object:x", label="town_hall~2", x_m=0.0, y_m=0.0), "town hall 2"),
+    (landmark("41a", names={"town_hall": 2.0}), "town hall"),
+    (landmark("41a", names={"town_hall": 2.0}, given_name="the_moot"), "the moot"),
+    (landmark("41a", names={}), "object 41a"),
     (Goal(id=goal_id("bakery"), object="bakery"), "the goal bakery"),
     (Goal(id=goal_id("12.5,-3"), x_m=12.5, y_m=-3.0), "the goal at (12.5, -3.0) m"),
     (Goal(id=goal_id("home"), x_m=0.0, y_m=-0.01), "the goal home at (0.0, 0.0) m"),
@@ -255,7 +257,7 @@ def test_a_broadcast_that_led_to_no_action_says_what_goes_on(tmp_path: Path) -> 
 
 def test_a_coalition_is_summed_up_by_its_first_nodes() -> None:
     long = coalition("novelty", 0.9, "")
-    buildings = [Object(id=f"object:{n}", label=f"house_{n}", x_m=0.0, y_m=0.0) for n in range(9)]
+    buildings = [landmark(f"{number}a", names={f"house_{number}": 1.0}) for number in range(9)]
     many = structs.replace(long, nodes=[AGENT, *buildings])
 
     assert names.brief(long) == "the agent, library"

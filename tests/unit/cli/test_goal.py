@@ -10,8 +10,8 @@ from click.testing import CliRunner
 
 from cogmap.cli.goal import goal, parsed, plan_json, plan_text, read_goals
 from cogmap.errors import UsageError
-from cogmap.schemas.nodes import PLAN_ID, Object, Plan, PlanState, goal_id, object_id
-from cogmap.testing import graph_of
+from cogmap.schemas.nodes import PLAN_ID, Plan, PlanState, goal_id
+from cogmap.testing import graph_of, landmark
 
 
 def test_two_numbers_are_a_position_and_other_words_names() -> None:
@@ -82,7 +82,7 @@ def test_the_line_that_is_wrong_is_named(tmp_path: Path) -> None:
 def test_for_a_goal_that_is_not_on_the_map_the_nearest_object_is_suggested() -> None:
     unknown = PlanState.UNKNOWN_GOAL
     plan = Plan(id=PLAN_ID, state=unknown, unreachable={goal_id("bakry"): unknown})
-    bakery = Object(id=object_id("bakery"), label="bakery", x_m=1.0, y_m=2.0)
+    bakery = landmark("bakery", [(1.0, 2.0)])
     graph = graph_of(plan, bakery)
 
     text = plan_text(plan, graph)

@@ -95,7 +95,9 @@ def _recollection() -> Recollection:
         x_m=5.0,
         y_m=0.0,
         heading_rad=0.5,
-        labels=["house"],
+        labels=["12a"],
+        names=["house"],
+        given_names=[""],
         functions=["home"],
         matched=["house"],
         objects=Matrix.of([[15.0, 0.0, 0.5, 0.5, 8.0, 6.0, 20.0]]),
@@ -106,7 +108,8 @@ def _graph() -> Graph:
     """What every codelet finds something to do with."""
     goal = Goal(id=goal_id("house"), object="house")
     need = Need(id=need_id("energy"), label="energy", level=0.9, is_eased=True)
-    known = (_self(), _house(), *_path(), _closure(), _correction(), _recollection())
+    twin = landmark("home", [(11.0, 0.0)], names={"house": 3.0}, width_m=8.0, sightings=3)
+    known = (_self(), _house(), twin, *_path(), _closure(), _correction(), _recollection())
     return graph_of(*known, goal, need)
 
 
@@ -144,6 +147,7 @@ def _every_task() -> list[Task]:
         task("danger", percepts=house, scan=_NEAR_RAYS),
         task("place_lost"),
         task("episode"),
+        task("merging", about=["object:house", "object:home"]),
     ]
 
 

@@ -9,21 +9,20 @@ import pytest
 from cogmap.errors import MessageError
 from cogmap.schemas.cognition import Broadcast, Coalition, Trigger
 from cogmap.schemas.feelings import Feeling
-from cogmap.schemas.nodes import Object, category_id, object_id
+from cogmap.schemas.nodes import Object, category_id, name_id
 from cogmap.schemas.sensing import Associations
 from cogmap.services.epam.association.graph import MAX_NODES, AssociativeGraph
 from cogmap.services.epam.association.memory import Primer, nodes_of
 from cogmap.services.epam.association.prior import Prior
 from cogmap.services.epam.config import Priming
+from cogmap.testing import landmark
 
 SECOND_NS = 1_000_000_000
 CONFIG = Priming()
 
 
-def _object(label: str, function: str = "", salience: float = 0.0) -> Object:
-    return Object(
-        id=object_id(label), label=label, x_m=0.0, y_m=0.0, function=function, salience=salience
-    )
+def _object(name: str, function: str = "", salience: float = 0.0, *, label: str = "41a") -> Object:
+    return landmark(label, names={name: 1.0}, function=function, salience=salience)
 
 
 def _broadcast(second: int, *nodes: Object, feeling: Feeling = Feeling.NONE) -> Broadcast:
@@ -103,16 +102,16 @@ def test_a_graph_whose_parts_do_not_fit_is_refused() -> None:
 
 
 def test_what_is_conscious_are_objects_by_their_look_and_their_categories() -> None:
-    broadcast = _broadcast(1, _object("bakery", "shop"), _object("bakery~2", "shop"))
+    broadcast = _broadcast(1, _object("bakery", "shop"), _object("bakery", "shop", label="52b"))
 
-    assert nodes_of(broadcast) == [object_id("bakery"), category_id("shop")]
+    assert nodes_of(broadcast) == [name_id("bakery"), category_id("shop")]
 
 
 def test_an_object_that_is_missed_is_not_learned() -> None:
     gone = _object("bakery", salience=-1.0)
 
-    assert object_id("bakery") not in nodes_of(_broadcast(1, gone, feeling=Feeling.SURPRISE))
-    assert object_id("bakery") in nodes_of(_broadcast(1, gone, feeling=Feeling.DANGER))
+    assert name_id("bakery") not in nodes_of(_broadcast(1, gone, feeling=Feeling.SURPRISE))
+    assert name_id("bakery") in nodes_of(_broadcast(1, gone, feeling=Feeling.DANGER))
 
 
 def test_a_view_is_not_primed_by_what_came_after_the_view_before_the_last() -> None:
@@ -154,7 +153,7 @@ def test_the_graph_is_published_after_so_many_broadcasts() -> None:
 
 
 def test_a_prior_makes_what_is_primed_likelier_and_the_rest_no_less_likely() -> None:
-    prior = Prior({object_id("bakery"): 0.4}, share=0.5)
+    prior = Prior({name_id("bakery"): 0.4}, share=0.5)
     bakery, clinic = prior.log_ratio(["bakery", "clinic"]).tolist()
 
     assert bakery > clinic == 0.0
@@ -162,7 +161,7 @@ def test_a_prior_makes_what_is_primed_likelier_and_the_rest_no_less_likely() -> 
 
 def test_however_much_is_primed_it_has_no_more_than_its_share() -> None:
     labels = ["bakery", "clinic", "school"]
-    primed = {object_id(label): 0.9 for label in labels}
+    primed = {name_id(label): 0.9 for label in labels}
     ratios = np.exp(Prior(primed, share=0.5).log_ratio(labels))
 
     assert ratios.mean() == pytest.approx(1.5)

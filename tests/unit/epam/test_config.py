@@ -7,11 +7,7 @@ import pytest
 
 from cogmap.services.epam.config import Config
 
-BOUNDED = [
-    "percept_threshold",
-    "familiar",
-    "familiar_learned",
-]
+BOUNDED = ["percept_threshold"]
 
 
 def test_every_setting_has_a_description() -> None:

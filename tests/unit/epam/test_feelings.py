@@ -7,19 +7,19 @@ import pytest
 
 from cogmap.schemas.cognition import Broadcast, Coalition, Trigger
 from cogmap.schemas.feelings import Feeling, salience_of
-from cogmap.schemas.nodes import Object, feeling_id, object_id
+from cogmap.schemas.nodes import Object, feeling_id
 from cogmap.schemas.sensing import Associations
 from cogmap.services.epam.association.graph import MAX_NODES, AssociativeGraph
 from cogmap.services.epam.association.memory import BEHIND, Primer
 from cogmap.services.epam.config import Priming
-from cogmap.testing import percept
+from cogmap.testing import landmark, percept
 
 SECOND_NS = 1_000_000_000
 CONFIG = Priming()
 
 
-def _object(label: str, function: str = "") -> Object:
-    return Object(id=object_id(label), label=label, x_m=0.0, y_m=0.0, function=function)
+def _object(name: str, function: str = "", *, label: str = "41a") -> Object:
+    return landmark(label, names={name: 1.0}, function=function)
 
 
 class Story:
@@ -132,7 +132,7 @@ def test_an_object_that_was_never_conscious_is_felt_about_as_its_category() -> N
 
 def test_individuals_of_one_look_are_felt_about_alike() -> None:
     story = Story()
-    story.tell(_object("bakery~2"), feeling=Feeling.DANGER)
+    story.tell(_object("bakery", label="52b"), feeling=Feeling.DANGER)
 
     assert story.feelings("bakery") == [Feeling.DANGER]
 

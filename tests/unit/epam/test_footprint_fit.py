@@ -11,16 +11,22 @@ from cogmap.services.epam.layout.footprint_fit import ObjectPose, Silhouette, lo
 from tests.support.world.blocks import CAMERA, Block
 
 SIDES_M = (12.0, 8.0)
+KNOWN_SD_M = (0.02, 0.02)
 
 
 def _seen(
     x_m: float,
     y_m: float,
     turn_rad: float,
+    *,
     window: tuple[int, int] = (0, 320),
     noise_px: float = 0.0,
+    expected_m: tuple[float, float] = SIDES_M,
+    expected_sd_m: tuple[float, float] = KNOWN_SD_M,
 ) -> Silhouette:
-    """The outline of a block, as far as it is in the columns of `window`."""
+    """The outline of a block, as far as it is in the columns of `window`, and the sides that are
+    expected of it.
+    """
     columns = np.arange(CAMERA.width_px, dtype=float)
     slope = (columns - CAMERA.cx_px) / CAMERA.fx_px
     depth_m = Block(x_m, y_m, turn_rad, SIDES_M, 8.0, (0, 0, 0)).depth_m(slope)
@@ -37,7 +43,8 @@ def _seen(
         right=right + 0.5,
         left_true=bool(left == whole[0] and left > 0),
         right_true=bool(right == whole[-1] and right < CAMERA.width_px - 1),
-        sides_m=SIDES_M,
+        sides_m=expected_m,
+        sides_sd_m=expected_sd_m,
     )
 
 
@@ -82,6 +89,21 @@ def test_a_partly_visible_building_has_larger_standard_deviations() -> None:
 
     assert cut.range_sd_m > 1.5 * whole.range_sd_m
     assert cut.bearing_sd_rad > 2 * whole.bearing_sd_rad
+
+
+def test_the_sides_of_a_building_are_found_where_two_walls_of_it_are_seen() -> None:
+    outline = _seen(20.0, 0.0, 0.8, expected_m=(9.0, 9.0), expected_sd_m=(2.0, 2.0))
+    place = _located(outline)
+
+    assert place.width_m == pytest.approx(10.0, abs=0.5)
+    assert _error_m(place, 20.0, 0.0) < 1.0
+
+
+def test_a_building_whose_sides_are_unknown_is_placed_less_surely() -> None:
+    known = _located(_seen(20.0, 0.0, 0.0))
+    unknown = _located(_seen(20.0, 0.0, 0.0, expected_sd_m=(2.0, 2.0)))
+
+    assert unknown.range_sd_m > 1.5 * known.range_sd_m
 
 
 def test_several_objects_are_placed_as_each_alone_is() -> None:

@@ -1,4 +1,4 @@
-"""Segments recognized by their embeddings: taught labels, novel ones, unknown and background."""
+"""Segments recognized by their embeddings: taught labels, unknown buildings and background."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from cogmap.services.epam.recognition.objects import DEFAULT_PATH as WEIGHTS
 from cogmap.services.epam.recognition.objects import (
     DIMENSIONS,
     INPUT_SHAPE,
-    MAX_APPEARANCES,
     OUTPUT_SHAPES,
     Appearance,
     ObjectRecognizer,
@@ -64,31 +63,33 @@ def test_a_taught_object_has_its_label_its_size_and_a_high_activation(
     assert found.activation > 0.95
 
 
-def test_an_unknown_object_has_no_label_until_it_is_learned(
+def test_a_building_that_was_not_taught_is_unknown_and_has_no_size(
     recognizer: ObjectRecognizer,
 ) -> None:
-    unknown = _appearance(5)
-    before = recognizer.recognize(unknown)
-    assert not before.known
-    assert before.size_m is None
-    assert before.unknown > 0.9
+    found = recognizer.recognize(_appearance(5))
 
-    recognizer.learn("new-building-1", unknown.embedding)
-    after = recognizer.recognize(_appearance(5, 6, 0.25))
-    other = recognizer.recognize(_appearance(9))
-    assert after.label == "new-building-1"
-    assert after.size_m is None
-    assert after.activation > 0.9
-    assert not other.known
+    assert not found.known
+    assert found.size_m is None
+    assert found.unknown > 0.9
 
 
-def test_an_excluded_label_is_not_considered(recognizer: ObjectRecognizer) -> None:
-    bank = _appearance(1, 0, 0.35)
-    found = recognizer.recognize(bank)
-    other = recognizer.recognize(bank, {"bank"})
+def test_the_names_of_a_building_are_as_likely_as_it_looks_like_each(
+    recognizer: ObjectRecognizer,
+) -> None:
+    between = recognizer.recognize(_appearance(1, 0, 0.45))
 
-    assert (found.label, other.label) == ("bank", "bakery")
-    assert other.activation > found.unknown
+    assert (between.label, list(between.names)) == ("bank", ["bakery", "bank"])
+    assert between.evidence == between.names["bank"] > between.names["bakery"] > 0.01
+    assert sum(between.names.values()) <= 1.0
+
+
+def test_an_appearance_is_published_with_how_it_is_to_be_compared(
+    recognizer: ObjectRecognizer,
+) -> None:
+    published = recognizer.published(_appearance(5))
+
+    np.testing.assert_array_equal(published.direction.numpy(), _direction(5))
+    assert (published.sharpness, published.even_cosine) == (20.0, 0.4)
 
 
 def test_background_is_neither_a_known_nor_an_unknown_building(
@@ -100,42 +101,6 @@ def test_background_is_neither_a_known_nor_an_unknown_building(
         assert not found.known
         assert found.background == pytest.approx(0.9)
         assert found.unknown < 0.1
-
-
-def test_an_objects_cosine_is_that_of_its_most_similar_appearance(
-    recognizer: ObjectRecognizer,
-) -> None:
-    recognizer.learn("new-building-1", _direction(5))
-    before = recognizer.recognize(_appearance(6))
-
-    recognizer.learn("new-building-1", _direction(6))
-    after = recognizer.recognize(_appearance(6))
-    first_side = recognizer.recognize(_appearance(5))
-    labels = [label for label, _ in recognizer.learned]
-
-    assert not before.known
-    assert after.label == "new-building-1"
-    assert after.activation == first_side.activation
-    assert labels == ["new-building-1", "new-building-1"]
-
-
-def test_an_appearance_is_new_if_it_differs_from_the_few_that_are_known(
-    recognizer: ObjectRecognizer,
-) -> None:
-    recognizer.learn("new-building-1", _direction(5))
-    alike, other = (recognizer.recognize(_appearance(5, 6, share)) for share in (0.1, 0.35))
-    taught = recognizer.recognize(_appearance(1, 2, 0.3))
-
-    assert other.label == "new-building-1"
-    assert [recognizer.is_new_appearance(one) for one in (alike, other, taught)] == [
-        False,
-        True,
-        False,
-    ]
-
-    for number in range(MAX_APPEARANCES - 1):
-        recognizer.learn("new-building-1", _direction(10 + number))
-    assert not recognizer.is_new_appearance(other)
 
 
 def test_posteriors_sum_to_1_over_labels_unknown_building_and_background() -> None:

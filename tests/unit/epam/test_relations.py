@@ -6,16 +6,26 @@ import msgspec
 import pytest
 
 from cogmap.schemas.cognition import Broadcast, Coalition, Relation, Trigger
-from cogmap.schemas.nodes import ROOT_MAP, Object, Side, category_id, map_id, object_id, relation_id
+from cogmap.schemas.nodes import (
+    ROOT_MAP,
+    Side,
+    category_id,
+    map_id,
+    name_id,
+    object_id,
+    relation_id,
+)
 from cogmap.schemas.sensing import Associations
 from cogmap.services.epam.association.memory import BEHIND, Primer, nodes_of
 from cogmap.services.epam.association.prior import Prior
 from cogmap.services.epam.association.relations import NamedObject, beside, related
 from cogmap.services.epam.config import Priming
+from cogmap.testing import landmark
 
 SECOND_NS = 1_000_000_000
 CONFIG = Priming()
 LEFT_OF_BAKERY = relation_id(Side.LEFT_OF, "bakery")
+RIGHT_OF_SCHOOL = relation_id(Side.RIGHT_OF, "school")
 RIGHT_OF_BAKERY = relation_id(Side.RIGHT_OF, "bakery")
 
 
@@ -28,11 +38,11 @@ def _seen_so(*looks: str) -> dict[str, Relation]:
 
 
 def _broadcast(second: int, *looks: str, maps: tuple[str, ...] = ()) -> Broadcast:
-    nodes = [Object(id=object_id(look), label=look, x_m=0.0, y_m=0.0) for look in looks]
+    nodes = [landmark(look) for look in looks]
     coalition = Coalition(
         codelet="test",
         activation=0.5,
-        nodes=list(nodes),
+        nodes=[*nodes],
         maps=list(maps),
         relations=_seen_so(*looks),
     )
@@ -66,17 +76,17 @@ def _expected(primer: Primer, relation: str) -> dict[str, float]:
 
 def test_neighbours_in_a_broadcast_stand_left_and_right_of_each_other() -> None:
     assert related(_seen_so("school", "bakery", "clinic").values()) == {
-        relation_id(Side.RIGHT_OF, "school"): object_id("bakery"),
-        LEFT_OF_BAKERY: object_id("school"),
-        RIGHT_OF_BAKERY: object_id("clinic"),
-        relation_id(Side.LEFT_OF, "clinic"): object_id("bakery"),
+        RIGHT_OF_SCHOOL: name_id("bakery"),
+        LEFT_OF_BAKERY: name_id("school"),
+        RIGHT_OF_BAKERY: name_id("clinic"),
+        relation_id(Side.LEFT_OF, "clinic"): name_id("bakery"),
     }
 
 
 def test_what_stood_left_of_a_building_is_expected_there_and_not_on_its_right() -> None:
     primer, _ = _taught(*[("school", "bakery")] * 10)
 
-    assert _expected(primer, LEFT_OF_BAKERY)[object_id("school")] > 0.5
+    assert _expected(primer, LEFT_OF_BAKERY)[name_id("school")] > 0.5
     assert _expected(primer, RIGHT_OF_BAKERY) == {}
 
 
@@ -84,7 +94,14 @@ def test_of_two_that_stood_there_the_one_of_late_is_expected_more() -> None:
     primer, _ = _taught(*[("school", "bakery")] * 10, *[("clinic", "bakery")] * 10)
     expected = _expected(primer, LEFT_OF_BAKERY)
 
-    assert expected[object_id("clinic")] > expected[object_id("school")] > 0.0
+    assert expected[name_id("clinic")] > expected[name_id("school")] > 0.0
+
+
+def test_what_has_no_name_stands_beside_nothing() -> None:
+    assert related(_seen_so("school", "", "clinic").values()) == {
+        RIGHT_OF_SCHOOL: name_id("clinic"),
+        relation_id(Side.LEFT_OF, "clinic"): name_id("school"),
+    }
 
 
 def test_a_relation_is_not_unlearned_while_it_is_out_of_view() -> None:
@@ -119,7 +136,7 @@ def test_something_seen_stands_beside_the_nearest_that_are_named() -> None:
     }
 
     assert beside(120.0, named) == {
-        relation_id(Side.RIGHT_OF, "school"): 0.8,
+        RIGHT_OF_SCHOOL: 0.8,
         LEFT_OF_BAKERY: 0.7,
     }
     assert beside(300.0, named) == {RIGHT_OF_BAKERY: 0.7}
@@ -127,7 +144,7 @@ def test_something_seen_stands_beside_the_nearest_that_are_named() -> None:
 
 
 def test_the_less_evidence_there_is_of_a_building_the_less_is_expected_beside_it() -> None:
-    prior = Prior(share=0.5, related={LEFT_OF_BAKERY: {object_id("school"): 0.8}})
+    prior = Prior(share=0.5, related={LEFT_OF_BAKERY: {name_id("school"): 0.8}})
     sure = prior.where({LEFT_OF_BAKERY: 1.0}).log_ratio(["school", "clinic"])
     unsure = prior.where({LEFT_OF_BAKERY: 0.1}).log_ratio(["school", "clinic"])
 
@@ -140,21 +157,21 @@ def test_a_sub_map_that_is_conscious_is_a_node_which_its_buildings_are_linked_wi
     district = map_id(3)
     told = _broadcast(1, "bakery", maps=(ROOT_MAP, district))
 
-    assert nodes_of(told) == [object_id("bakery"), district]
+    assert nodes_of(told) == [name_id("bakery"), district]
     primer.on_broadcast(told)
     primer.on_broadcast(_broadcast(2, maps=(ROOT_MAP, district)))
     for second in range(1, 4 + BEHIND):
         primer.begin(second * SECOND_NS)
-    assert object_id("bakery") in primer.prior(4 * SECOND_NS).primed
+    assert name_id("bakery") in primer.prior(4 * SECOND_NS).primed
 
 
 def test_categories_are_conscious_with_the_districts_of_what_has_them() -> None:
-    node = Object(id=object_id("bakery"), label="bakery", x_m=0.0, y_m=0.0, function="shop")
+    node = landmark("bakery", function="shop")
     told = _broadcast(1, maps=(map_id(1),))
     coalition = msgspec.structs.replace(told.coalition, nodes=[node])
 
     assert nodes_of(msgspec.structs.replace(told, coalition=coalition)) == [
-        object_id("bakery"),
+        name_id("bakery"),
         category_id("shop"),
         map_id(1),
     ]

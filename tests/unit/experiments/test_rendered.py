@@ -87,7 +87,7 @@ def test_the_room_with_cameras_sees_its_landmarks_where_they_are() -> None:
         room.close()
 
     assert isinstance(percepts, Percepts)
-    seen = {each.label: each for each in percepts.objects}
+    seen = {each.name: each for each in percepts.objects}
     names = ("bakery", "library", "town_hall")
     for name, (x_m, y_m) in zip(names, LANDMARKS, strict=True):
         forward_m = y_m - 0.0

@@ -64,7 +64,7 @@ def test_the_next_place_is_an_episode_of_its_own_that_has_the_path_to_it() -> No
 def test_of_its_content_an_episode_has_looks_the_most_salient_first() -> None:
     mind = Mind()
     energy = Need(id=need_id("energy"), label="energy", level=0.9, salience=-0.75)
-    mind.live((0.0, 0.0), *seen("house", "house~2", "tower"), energy)
+    mind.live((0.0, 0.0), *seen("house", "house", "tower"), energy)
     mind.live((0.0, 0.0), *seen("tower", salience=0.5), cycles=2)
 
     (episode,) = mind.episodes()

@@ -30,7 +30,7 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.schemas.sensing import RangeScan
 from cogmap.services.memory.module import Config, build
-from cogmap.testing import agent, of_type
+from cogmap.testing import agent, landmark, of_type
 
 CONFIG = Config(store_cycles=2, recall_cycles=1)
 LOOKS = ("bakery", "tower", "house", "school")
@@ -41,9 +41,10 @@ AT_M = np.random.default_rng(7).uniform(-60, 60, (12, 2))
 def buildings(at_m: np.ndarray[tuple[int, int], np.dtype[np.float64]]) -> list[Operation]:
     """Buildings of several looks that were seen often."""
     nodes: list[Operation] = []
-    for number, (x_m, y_m) in enumerate(at_m.tolist()):
-        label = LOOKS[number % 4] if number < 4 else f"{LOOKS[number % 4]}~{1 + number // 4}"
-        nodes.append(Object(id=object_id(label), label=label, x_m=x_m, y_m=y_m, sightings=9))
+    for number, at in enumerate(at_m.tolist()):
+        label = individual_label(41, number)
+        names = {LOOKS[number % 4]: 9.0}
+        nodes.append(landmark(label, [at], names=names, sightings=9))
 
     return nodes
 
@@ -52,9 +53,9 @@ def houses() -> list[Operation]:
     """Houses of two looks on both sides of a street along x."""
     nodes: list[Operation] = []
     for number, x_m in enumerate((8.0, 17.0, 31.0, 38.0, 52.0, 63.0, 74.0, 88.0), start=1):
-        label = individual_label("works" if number in (3, 5) else "house", number)
+        names = {"works" if number in (3, 5) else "house": 9.0}
         y_m = 9.0 * (-1.0) ** number
-        nodes.append(Object(id=object_id(label), label=label, x_m=x_m, y_m=y_m, sightings=9))
+        nodes.append(landmark(individual_label(number, 0), [(x_m, y_m)], names=names, sightings=9))
 
     return nodes
 
@@ -152,17 +153,18 @@ def test_a_map_that_was_conscious_is_stored_with_its_objects_and_places() -> Non
     (objects,) = of_type(StoredObjects, stored.records)
     (tile,) = of_type(StoredTile, stored.records)
     assert objects.map == tile.map == "remembered:1"
-    assert sorted(objects.labels)[:2] == ["bakery", "bakery~2"]
+    assert sorted(objects.labels)[:2] == ["41a", "41b"]
+    assert objects.names.count("bakery") == 3
     assert objects.objects.shape == (12, 7)
     assert tile.columns[PlaceColumn.ROAD].numpy()[0, 3 * 32 + 4] == 0.75
 
 
 def test_the_sub_maps_of_a_map_are_stored_with_their_objects_and_recalled_with_it() -> None:
-    first = Mind(*buildings(AT_M), *district("bakery", "tower"))
+    first = Mind(*buildings(AT_M), *district("41a", "41b"))
     records = stored_in(first.live(3)).records
     (tree,) = of_type(StoredTree, records)
     assert [(each.number, each.parent) for each in tree.sub_maps] == [(4, 0)]
-    assert tree.sub_maps[0].members == ["bakery", "tower"]
+    assert tree.sub_maps[0].members == ["41a", "41b"]
 
     second = Mind(*buildings(transform_to(POSE, AT_M)))
     second.module.feed(Restored(records=records))
@@ -172,9 +174,9 @@ def test_the_sub_maps_of_a_map_are_stored_with_their_objects_and_recalled_with_i
 
 
 def test_sub_maps_are_stored_again_where_an_object_has_changed_its_own() -> None:
-    mind = Mind(*buildings(AT_M), *district("bakery", "tower"))
+    mind = Mind(*buildings(AT_M), *district("41a", "41b"))
     mind.live(3)
-    mind.commit(4, *district("school"))
+    mind.commit(4, *district("41d"))
 
     published: list[Message] = []
     for cycle in range(4, 8):
@@ -182,7 +184,7 @@ def test_sub_maps_are_stored_again_where_an_object_has_changed_its_own() -> None
 
     (tree,) = stored_in(published).records
     assert isinstance(tree, StoredTree)
-    assert tree.sub_maps[0].members == ["bakery", "school", "tower"]
+    assert tree.sub_maps[0].members == ["41a", "41b", "41d"]
 
 
 def test_a_map_that_was_never_conscious_is_not_stored() -> None:

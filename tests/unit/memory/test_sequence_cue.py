@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -15,12 +16,12 @@ from cogmap.schemas.nodes import (
     PathColumn,
     PathSegment,
     individual_label,
-    object_id,
     segment_id,
 )
 from cogmap.services.memory.maps import RememberedMap
 from cogmap.services.memory.recall import Recalled, recalled
 from cogmap.services.memory.sequence_cue import Way, way_of
+from cogmap.testing import landmark
 
 POSE = np.array([30.0, -10.0, 0.7])
 STREET_M = np.column_stack([np.arange(0.0, 100.0), np.zeros(100)])
@@ -32,9 +33,9 @@ def houses(looks: list[str], along_m: Floats, beside_m: float = 9.0) -> list[Obj
     """Houses along a street, on both sides of it in turn."""
     nodes = []
     for number, (look, x_m) in enumerate(zip(looks, along_m.tolist(), strict=True), start=1):
-        label = individual_label(look, number)
         y_m = beside_m if number % 2 else -beside_m
-        nodes.append(Object(id=object_id(label), label=label, x_m=x_m, y_m=y_m, sightings=9))
+        label = individual_label(number, 0)
+        nodes.append(landmark(label, [(x_m, y_m)], names={look: 9.0}, sightings=9))
 
     return nodes
 
@@ -46,6 +47,8 @@ def learned(nodes: list[Object]) -> RememberedMap:
         map="town",
         cell_m=1.0,
         labels=[node.label for node in nodes],
+        names=[node.look for node in nodes],
+        given_names=[""] * len(nodes),
         functions=[""] * len(nodes),
         objects=Matrix.of(rows),
     )
@@ -57,9 +60,7 @@ def seen_from(pose: Floats, nodes: list[Object]) -> list[Object]:
     moved = []
     for node in nodes:
         ((x_m, y_m),) = transform_to(pose, np.array([[node.x_m, node.y_m]])).tolist()
-        moved.append(
-            Object(id=node.id, label=node.label, x_m=x_m, y_m=y_m, sightings=node.sightings)
-        )
+        moved.append(msgspec.structs.replace(node, x_m=x_m, y_m=y_m))
 
     return moved
 

@@ -17,11 +17,9 @@ def program(action: str, **parameters: Scalar) -> MotorProgram:
 
 
 def test_to_seek_is_to_have_the_goal_of_the_object_for_the_need() -> None:
-    goal = sought_by(program(ActionName.SEEK, need="energy", object="charging-place~2"))
+    goal = sought_by(program(ActionName.SEEK, need="energy", object="41a"))
 
-    assert goal == Goal(
-        id=goal_id("energy"), base_level=1.0, object="charging-place~2", need="energy"
-    )
+    assert goal == Goal(id=goal_id("energy"), base_level=1.0, object="41a", need="energy")
 
 
 def test_other_actions_have_no_goal() -> None:

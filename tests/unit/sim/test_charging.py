@@ -107,7 +107,7 @@ def _seen(
     """The percepts of charging places in a street with one."""
     street = Place(seed=1, roads=(STREET,), plots=plots, props=(post,), start=AT_ORIGIN)
     view = TownSensors(street, Surroundings(street), errors, MOUNT, 1).look(pose)
-    return [percept for percept in view.objects if percept.label == CHARGING_PLACE]
+    return [percept for percept in view.objects if percept.name == CHARGING_PLACE]
 
 
 def test_a_charging_place_is_seen_where_it_stands_with_its_function() -> None:

@@ -181,10 +181,10 @@ def test_a_building_behind_another_is_not_seen() -> None:
     behind = Plot(KINDS["florist"], 55.0, 0.0, -math.pi / 2)
     beside = Plot(KINDS["cafe"], 45.0, 20.0, 0.0)
 
-    labels = [percept.label for percept in _seen(_place(BANK, behind, beside)).objects]
+    labels = [percept.name for percept in _seen(_place(BANK, behind, beside)).objects]
     assert sorted(labels) == ["bank", "cafe"]
 
-    alone = [percept.label for percept in _seen(_place(behind)).objects]
+    alone = [percept.name for percept in _seen(_place(behind)).objects]
     assert alone == ["florist"]
 
 
@@ -192,7 +192,7 @@ def test_a_building_that_another_or_the_border_cuts_is_not_whole() -> None:
     peeping = Plot(KINDS["library"], 55.0, 7.0, 0.0)
     at_border = Plot(KINDS["cafe"], 30.0, 22.0, 0.0)
     seen = _seen(_place(BANK, peeping, at_border)).objects
-    whole = {percept.label: percept.whole for percept in seen}
+    whole = {percept.name: percept.whole for percept in seen}
 
     assert whole == {"bank": True, "library": False, "cafe": False}
 

@@ -38,7 +38,7 @@ def _views(config: Config, count: int) -> tuple[list[Percepts], list[TrueTown]]:
 
 def test_a_building_that_is_gone_is_not_seen_and_the_town_is_told_anew() -> None:
     before, (town,) = _views(_config(), 10)
-    labels = {percept.label for view in before for percept in view.objects}
+    labels = {percept.name for view in before for percept in view.objects}
     seen = [number for number, each in enumerate(town.buildings) if each.name in labels]
     gone = [Removal(building=number, from_s=1.0) for number in seen]
 
@@ -46,7 +46,7 @@ def test_a_building_that_is_gone_is_not_seen_and_the_town_is_told_anew() -> None
     late = [view for view in after if view.stamp_ns > 1_000_000_000]
     assert labels
     assert late
-    assert not labels & {percept.label for view in late for percept in view.objects}
+    assert not labels & {percept.name for view in late for percept in view.objects}
     assert len(towns[-1].buildings) == len(town.buildings) - len(seen)
     walls = np.asarray(towns[-1].walls_m.numpy())
     assert len(walls) == len(np.asarray(town.walls_m.numpy())) - 4 * len(seen)

@@ -128,7 +128,7 @@ def test_misses_confusions_and_noise_are_as_frequent_as_measured() -> None:
 
     assert len(percepts) / len(views) == pytest.approx(errors.detected, abs=0.02)
 
-    right = [percept.label == "house 3" for percept in percepts]
+    right = [percept.name == "house 3" for percept in percepts]
     assert np.mean(right) == pytest.approx(errors.right_name, abs=0.01)
 
     ranges_m = np.array([percept.range_m for percept in percepts])
@@ -141,7 +141,7 @@ def test_a_name_is_perceived_once_a_view() -> None:
 
     for _ in range(50):
         percepts = sense.perceive(AT_ORIGIN, [0, 1, 2])
-        labels = [percept.label for percept in percepts]
+        labels = [percept.name for percept in percepts]
         assert len(labels) == len(set(labels))
 
 
@@ -154,7 +154,7 @@ def test_a_function_is_that_of_the_name_that_is_perceived() -> None:
     seen = set()
     for _ in range(20):
         percepts = sense.perceive(AT_ORIGIN, [0, 1])
-        seen |= {(percept.label, percept.function) for percept in percepts}
+        seen |= {(percept.name, percept.function) for percept in percepts}
 
     assert seen == {("bakery", "shop"), ("villa", "home")}
 

@@ -106,7 +106,7 @@ def test_epam_recognizes_a_landmark_in_the_images_along_a_trajectory() -> None:
     seen = _percepts(_ride(_module(straight)))
     assert len(seen) == 3
 
-    (percept,) = [each for each in seen[-1].objects if each.label == "bakery"]
+    (percept,) = [each for each in seen[-1].objects if each.name == "bakery"]
     range_m = math.hypot(34.0, 14.0)
     bearing_rad = math.atan2(14.0, 34.0)
     assert percept.range_m == pytest.approx(range_m, rel=0.15)

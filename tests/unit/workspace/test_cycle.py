@@ -85,18 +85,6 @@ def test_a_phase_begins_when_every_task_of_the_one_before_is_answered() -> None:
     assert whereabouts.codelet == "whereabouts"
 
 
-def test_a_percept_below_the_threshold_is_no_object_of_the_map() -> None:
-    desk = Desk("w1")
-    desk.see(0, percept("a"), percept("b", activation=0.7))
-    (localization,) = desk.take()
-    desk.feed(answer(localization))
-
-    seen = [item.label for item in localization.percepts]
-
-    assert seen == ["a"]
-    assert _names(desk.take()) == ["1/object_place/a", "1/road_place", "1/path"]
-
-
 def test_deltas_are_numbered_without_a_gap() -> None:
     desk = Desk("w1", "w2")
     desk.drive(range(6), percept("a"), percept("b", 0.4))

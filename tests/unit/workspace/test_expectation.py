@@ -1,41 +1,49 @@
-"""What was recognised with the help of what was expected is active, and maps nothing."""
+"""What was expected makes a percept active; what it is called is learned from views alone."""
 
 from __future__ import annotations
 
-from cogmap.schemas.nodes import Object, object_id
-from cogmap.testing import percept
+import pytest
+
+from cogmap.schemas.nodes import Object
+from cogmap.schemas.sensing import Percept
+from cogmap.testing import percept, unidentified
 from tests.support.world.scenes import Desk
 
+RESTS = ((0.0, 0.0, 0.2, 0.01, 0.001),)
 
-def _desk() -> Desk:
-    """A workspace that has mapped two houses and has not seen one of them for a while."""
+
+def _seen(*views: Percept) -> Object:
+    """The one object that is known after these views of it from one place."""
     desk = Desk("w1")
-    desk.drive(range(8), percept("house"), percept("shop", 0.4))
-    desk.drive(range(8, 14), percept("house"))
-    return desk
+    for frame, view in enumerate(views):
+        desk.see(frame, unidentified(view), rows=RESTS)
+        desk.work()
+    (node,) = desk.graph.of_kind(Object)
+    return node
 
 
-def test_an_expected_object_becomes_active_and_is_not_placed_anew() -> None:
-    desk = _desk()
-    before = desk.graph.get(Object, object_id("shop"))
-    assert before is not None
+def test_what_was_expected_is_active_and_adds_no_evidence_for_its_name() -> None:
+    node = _seen(*[percept("shop", activation=0.9, evidence=0.3)] * 4)
 
-    desk.drive(range(14, 15), percept("shop", -1.2, activation=0.9, evidence=0.3))
-    after = desk.graph.get(Object, object_id("shop"))
-    assert after is not None
-    assert desk.graph.activation(after) > 0.85
-    assert (after.x_m, after.y_m, after.sightings) == (before.x_m, before.y_m, before.sightings)
+    assert node.activation == pytest.approx(0.9)
+    assert node.names["shop"] == pytest.approx(4 * 0.3)
+    assert node.names[""] == pytest.approx(4 * 0.7)
 
 
-def test_what_is_expected_and_unknown_gets_no_object() -> None:
-    desk = _desk()
-    desk.drive(range(14, 20), percept("bakery", activation=0.9, evidence=0.3))
+def test_an_object_is_called_what_most_views_would_call_it() -> None:
+    node = _seen(percept("shop", evidence=0.6), *[percept("bakery", evidence=0.8)] * 3)
 
-    assert desk.graph.get(Object, object_id("bakery")) is None
+    assert node.look == "bakery"
+    assert node.names["shop"] == pytest.approx(0.6)
 
 
-def test_what_was_expected_but_is_sure_by_itself_is_mapped() -> None:
-    desk = _desk()
-    desk.drive(range(14, 20), percept("bakery", 0.2, activation=0.9, evidence=0.8))
+def test_one_that_views_have_no_name_for_is_an_object_without_a_name() -> None:
+    node = _seen(*[percept("shop", name="", evidence=0.0)] * 3)
 
-    assert desk.graph.get(Object, object_id("bakery")) is not None
+    assert (node.look, node.name) == ("", "")
+
+
+def test_other_names_that_a_view_makes_likely_count_as_well() -> None:
+    node = _seen(*[percept("shop", evidence=0.5, names={"bakery": 0.4})] * 3)
+
+    assert node.names == pytest.approx({"shop": 1.5, "bakery": 1.2, "": 0.3})

@@ -15,7 +15,7 @@ from cogmap.schemas.nodes import (
     object_id,
     place_id,
 )
-from cogmap.testing import agent, of_type, percept
+from cogmap.testing import agent, landmark, of_type, percept
 from tests.support.world.scenes import Desk, thing
 
 OFFERED = Run(lockstep=True, participants={"memory": 1})
@@ -102,21 +102,22 @@ def _episode() -> Episode:
     )
 
 
-def _recalled(label: str, x_m: float) -> Offer:
-    node = Object(id=object_id(label), label=label, base_level=0.5, x_m=x_m, y_m=60.0, sightings=9)
+def _recalled(label: str, x_m: float, **facts: object) -> Offer:
+    usual = {"base_level": 0.5, "names": {"inn": 9.0}, "width_m": 8.0, "sightings": 9}
+    node = landmark(label, [(x_m, 60.0)], **(usual | facts))
     return Offer(cycle=0, operations=[thing("beside"), node], source="memory")
 
 
 def test_an_object_that_memory_recalls_is_on_the_map_at_its_place() -> None:
     desk = Desk("w1")
     desk.drive(range(1))
-    desk.feed(_recalled("inn", 30.2))
+    desk.feed(_recalled("41a", 30.2))
     desk.drive(range(1, 2))
     graph = desk.graph
-    inn = graph.get(Object, object_id("inn"))
+    inn = graph.get(Object, object_id("41a"))
 
     assert inn is not None
-    assert (inn.label, graph.base_level(inn), inn.sightings) == ("inn", 0.5, 9)
+    assert (inn.name, graph.base_level(inn), inn.sightings) == ("inn", 0.5, 9)
     assert graph.links.target(inn.id, LinkKind.AT) == place_id(30, 60)
 
 
@@ -125,21 +126,43 @@ def test_an_object_that_is_on_the_map_already_is_not_accepted_and_the_rest_of_it
 ):
     desk = Desk("w1")
     desk.drive(range(1))
-    for offer in (_recalled("inn", 30.0), _recalled("inn", 90.0), _recalled("inn~2", 34.0)):
+    for offer in (_recalled("41a", 30.0), _recalled("41a", 90.0), _recalled("52b", 32.0)):
         desk.feed(offer)
     desk.drive(range(1, 2))
     objects = {node.label: node.x_m for node in desk.graph.of_kind(Object)}
 
-    assert objects == {"inn": 30.0}
+    assert objects == {"41a": 30.0}
     assert "beside" in desk.graph.nodes
     assert sum(delta.rejected for delta in desk.deltas) == 2
+
+
+def test_one_that_looks_alike_beside_an_object_of_the_map_is_accepted() -> None:
+    desk = Desk("w1")
+    desk.drive(range(1))
+    for offer in (_recalled("41a", 30.0), _recalled("52b", 40.0)):
+        desk.feed(offer)
+    desk.drive(range(1, 2))
+
+    assert sorted(node.label for node in desk.graph.of_kind(Object)) == ["41a", "52b"]
+
+
+def test_an_object_that_is_offered_with_the_name_that_a_person_gave_it_is_called_so() -> None:
+    desk = Desk("w1")
+    desk.drive(range(1))
+    desk.feed(_recalled("41a", 30.0))
+    desk.drive(range(1, 2))
+    desk.feed(_recalled("41a", 90.0, given_name="the old inn"))
+    desk.drive(range(2, 3))
+    (inn,) = desk.graph.of_kind(Object)
+
+    assert (inn.name, inn.look, inn.x_m) == ("the old inn", "inn", 30.0)
 
 
 def test_an_object_by_whose_label_another_is_seen_right_now_is_not_accepted() -> None:
     desk = Desk("w1")
     desk.drive(range(1))
-    desk.feed(_recalled("inn", 30.0))
-    desk.drive(range(1, 2), percept("inn"))
+    desk.feed(_recalled("41a", 30.0))
+    desk.drive(range(1, 2), percept("41a"))
     (inn,) = desk.graph.of_kind(Object)
 
     assert inn.x_m < 20.0

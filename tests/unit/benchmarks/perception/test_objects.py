@@ -65,7 +65,7 @@ def test_the_thresholds_are_those_that_were_promised() -> None:
 
 def test_an_outline_holds_its_corners_and_what_is_between_them() -> None:
     percept = Percept(
-        label="bakery",
+        name="bakery",
         activation=0.9,
         evidence=0.9,
         bearing_rad=0.0,

@@ -51,7 +51,7 @@ def shade(frame: int) -> Pixels:
 
 def percept(number: int) -> Percept:
     return Percept(
-        label=f"town_hall_{number}",
+        name=f"town_hall_{number}",
         activation=0.9,
         evidence=0.9,
         bearing_rad=0.3 - 0.5 * number,

@@ -144,9 +144,9 @@ def test_coalitions_leave_samples_behind_and_keep_links_and_maps() -> None:
 
 
 def test_a_coalition_has_how_its_objects_were_perceived_to_stand_to_the_agent() -> None:
-    graph = graph_of(agent(), landmark("house"), landmark("house~2"))
+    graph = graph_of(agent(), landmark("house"), landmark("41a"))
     seen = [
-        percept("house~2", bearing_rad=0.2, range_m=12.0),
+        percept("41a", bearing_rad=0.2, range_m=12.0, name="house"),
         percept("house", range_sd_m=99.0),
         percept("shop"),
     ]
@@ -154,7 +154,7 @@ def test_a_coalition_has_how_its_objects_were_perceived_to_stand_to_the_agent() 
     (brought,) = run(task("whereabouts", percepts=seen), graph, CONFIG).coalitions
 
     ((name, relation),) = brought.relations.items()
-    assert name == "object:house~2"
+    assert name == "object:41a"
     assert (relation.look, relation.range_m, relation.bearing_rad) == ("house", 12.0, 0.2)
 
 

@@ -60,7 +60,7 @@ def _charging_place(label: str, x_m: float, function: str = "charge") -> Object:
 
 def test_the_nearest_object_that_satisfies_the_need_is_brought_with_it() -> None:
     near = _charging_place("charging-place", 20.0)
-    far = _charging_place("charging-place~2", -50.0)
+    far = _charging_place("41a", -50.0)
     bakery = _charging_place("bakery", 5.0, "shop")
     (found,) = run(
         task("need"), graph_of(agent(), _need(0.75), near, far, bakery), CONFIG
@@ -72,7 +72,7 @@ def test_the_nearest_object_that_satisfies_the_need_is_brought_with_it() -> None
 
 def test_the_next_object_is_brought_where_the_nearest_cannot_be_reached() -> None:
     near = _charging_place("charging-place", 20.0)
-    far = _charging_place("charging-place~2", -50.0)
+    far = _charging_place("41a", -50.0)
     goal = Goal(id=goal_id("energy"), object=near.label, need="energy")
     plan = Plan(id=PLAN_ID, state=PlanState.NO_ROUTE, unreachable={goal.id: PlanState.NO_ROUTE})
     graph = graph_of(agent(), _need(0.75), near, far, goal, plan)

@@ -53,9 +53,11 @@ def recollection() -> Recollection:
         x_m=100.0,
         y_m=0.0,
         heading_rad=QUARTER_RAD,
-        labels=["house", "house~2"],
+        labels=["12a", "30b"],
+        names=["house", "house"],
+        given_names=["", "the mill"],
         functions=["home", "home"],
-        matched=["house", ""],
+        matched=["41a", ""],
         objects=Matrix.of(objects),
         tiles=[(2, -1)],
         columns={
@@ -74,6 +76,11 @@ def joined(*operations: Operation) -> Graph:
     delta = Delta(version=2, cycle=1, phase=Phase.CORRECTION, operations=answer.operations)
     assert graph.apply(delta)
     return graph
+
+
+def house(label: str = "41a", x_m: float = 10.0, y_m: float = 0.0, **facts: int) -> Object:
+    """A house of the root map, by default the one that the first recalled one matches."""
+    return landmark(label, [(x_m, y_m)], names={"house": 4.0}, width_m=8.0, **facts)
 
 
 def node(graph: Graph, label: str) -> Object:
@@ -101,30 +108,34 @@ def test_the_agent_stands_where_it_is_on_the_recalled_map() -> None:
 
 
 def test_an_object_known_here_is_the_recalled_one_and_was_seen_as_often_as_both() -> None:
-    house = node(joined(landmark("house", sightings=5)), "house")
+    known = node(joined(house(sightings=5)), "41a")
 
-    assert (house.x_m, house.y_m) == (100.0, 10.0)
-    assert house.sightings == 25
-    assert house.function == "home"
+    assert (known.x_m, known.y_m) == (100.0, 10.0)
+    assert known.sightings == 25
+    assert known.function == "home"
+    assert known.names == {"house": 24.0}
 
 
-def test_a_recalled_object_that_is_not_known_here_gets_a_label_that_is_free() -> None:
-    other = landmark("house~2", [(-30.0, 5.0)], sightings=4)
-    graph = joined(landmark("house", sightings=5), other)
+def test_a_recalled_object_that_is_not_known_here_gets_a_label_of_its_own() -> None:
+    graph = joined(house(sightings=5), house("30b", -30.0, 5.0, sightings=4))
 
-    recalled = node(graph, "house~3")
-    assert (recalled.x_m, recalled.y_m) == (60.0, 60.0)
+    recalled = node(graph, "recalled1b")
+    assert (recalled.x_m, recalled.y_m, recalled.look) == (60.0, 60.0, "house")
     assert graph.links.target(recalled.id, LinkKind.AT) == "place:map:0:60:60"
-    kept = node(graph, "house~2")
+    kept = node(graph, "30b")
     assert (kept.x_m, kept.y_m) == pytest.approx((95.0, -30.0))
 
 
 def test_an_unmatched_object_that_stands_where_one_of_its_look_was_is_the_same() -> None:
-    there = landmark("house~2", [(58.5, 40.5)], sightings=1)
-    graph = joined(landmark("house", sightings=5), there)
+    graph = joined(house(sightings=5), house("52b", 58.5, 40.5, sightings=1))
 
-    assert node(graph, "house~2").sightings == 13
-    assert object_id("house~3") not in graph.nodes
+    assert node(graph, "52b").sightings == 13
+    assert object_id("recalled1b") not in graph.nodes
+
+
+def test_an_object_keeps_the_name_that_a_person_gave_it_in_an_earlier_run() -> None:
+    assert node(joined(house()), "recalled1b").name == "the mill"
+    assert node(joined(house(), house("52b", 58.5, 40.5)), "52b").name == "the mill"
 
 
 def test_place_nodes_are_as_they_were_learned_with_weights_by_their_evidence() -> None:
@@ -204,12 +215,12 @@ def district(number: int, *members: str) -> SubMap:
 
 
 def test_recalled_objects_are_in_the_sub_maps_that_they_were_in() -> None:
-    graph = joined(districts(district(7, "house", "house~2")), landmark("house"))
+    graph = joined(districts(district(7, "12a", "30b")), house())
 
     found = graph.get(Map, map_id(7))
     assert found is not None
     assert (found.parent, found.x_m, found.y_m, found.width_m) == (ROOT_MAP, 80, 35, 40)
-    for label in ("house", "house~2"):
+    for label in ("41a", "recalled1b"):
         assert graph.links.target(object_id(label), LinkKind.WITHIN) == map_id(7)
 
 
@@ -217,17 +228,17 @@ def test_sub_maps_of_this_run_make_way_and_keep_what_was_not_recalled() -> None:
     own = Map(id=map_id(7), parent=ROOT_MAP, cell_m=1.0, x_m=10.0, y_m=5.0, width_m=9, height_m=9)
     links = [
         Link(source=object_id(label), target=map_id(7), kind=LinkKind.WITHIN)
-        for label in ("house", "bakery")
+        for label in ("41a", "bakery")
     ]
     graph = joined(
-        districts(district(7, "house", "house~2")),
-        landmark("house"),
+        districts(district(7, "12a", "30b")),
+        house(),
         landmark("bakery"),
         own,
         *links,
     )
 
-    assert graph.links.sources(map_id(7), LinkKind.WITHIN) == ("object:house", "object:house~2")
+    assert graph.links.sources(map_id(7), LinkKind.WITHIN) == ("object:41a", "object:recalled1b")
     assert graph.links.sources(map_id(8), LinkKind.WITHIN) == ("object:bakery",)
     kept = graph.get(Map, map_id(8))
     assert kept is not None
@@ -236,11 +247,11 @@ def test_sub_maps_of_this_run_make_way_and_keep_what_was_not_recalled() -> None:
 
 def test_a_sub_map_whose_objects_were_all_recalled_is_another_or_gone() -> None:
     own = Map(id=map_id(3), parent=ROOT_MAP, cell_m=1.0)
-    link = Link(source=object_id("house"), target=map_id(3), kind=LinkKind.WITHIN)
-    graph = joined(districts(district(7, "house", "house~2")), landmark("house"), own, link)
+    link = Link(source=object_id("41a"), target=map_id(3), kind=LinkKind.WITHIN)
+    graph = joined(districts(district(7, "12a", "30b")), house(), own, link)
 
     assert graph.get(Map, map_id(3)) is None
-    assert graph.links.target(object_id("house"), LinkKind.WITHIN) == map_id(7)
+    assert graph.links.target(object_id("41a"), LinkKind.WITHIN) == map_id(7)
 
 
 def test_recalled_sub_maps_keep_their_numbers_when_their_objects_are_sorted_anew() -> None:
@@ -260,6 +271,8 @@ def test_recalled_sub_maps_keep_their_numbers_when_their_objects_are_sorted_anew
         y_m=0.0,
         heading_rad=0.0,
         labels=labels,
+        names=[""] * len(labels),
+        given_names=[""] * len(labels),
         functions=[""] * len(labels),
         matched=[""] * len(labels),
         objects=Matrix.of(rows),
@@ -271,6 +284,10 @@ def test_recalled_sub_maps_keep_their_numbers_when_their_objects_are_sorted_anew
     answer = run(task("map_structure", about=outdated), graph, CONFIG)
     graph.change(answer.operations)
 
-    for number, names in members.items():
-        within = {graph.links.target(object_id(name), LinkKind.WITHIN) for name in names}
+    for number in members:
+        within = {
+            graph.links.target(each.id, LinkKind.WITHIN)
+            for each in graph.of_kind(Object)
+            if abs(each.x_m - 1000.0 * number) < 500.0
+        }
         assert within == {map_id(number)}

@@ -13,6 +13,7 @@ from cogmap.geometry.se2 import integrate, transform_to
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.correction.joint import by_side, optimize_jointly
 from cogmap.services.codelets.mapping.observations import Sightings
+from cogmap.services.codelets.mapping.ranges import Ranges
 from tests.support.paths import mean_distance_m
 
 SIDE = 20
@@ -21,6 +22,7 @@ LANDMARKS = {"tower": np.array([10.0, 10.0]), "mill": np.array([25.0, 5.0])}
 STEP_VARIANCE = np.array([1e-3, 1e-3, 1e-5])
 SIGHTING_SD_M = 0.5
 NEARER_M = 1.0
+NOTHING_HEARD = Ranges.of([], np.zeros(0))
 
 
 def _steps(laps: int, turn_error_rad: float = 0.0) -> Constraints:
@@ -84,7 +86,7 @@ def test_a_bias_by_side_bends_a_good_path_only_as_a_single_landmark(
     seen = _sightings(graph.poses)
     config = Config(landmarks=landmarks)
 
-    poses, _ = optimize_jointly(graph, seen, config)
+    poses, _ = optimize_jointly(graph, seen, NOTHING_HEARD, config)
     bent_m = mean_distance_m(poses, graph.poses)
 
     assert bent_m > 0.2 if landmarks == "points" else bent_m < 0.1
@@ -96,7 +98,7 @@ def test_sides_bind_the_second_lap_to_the_first() -> None:
     seen = _sightings(truth)
 
     alone = optimize(drifted)
-    joint, _ = optimize_jointly(drifted, seen, Config())
+    joint, _ = optimize_jointly(drifted, seen, NOTHING_HEARD, Config())
 
     alone_m = mean_distance_m(alone[LAP : 2 * LAP], alone[:LAP])
     joint_m = mean_distance_m(joint[LAP : 2 * LAP], joint[:LAP])
@@ -108,5 +110,5 @@ def test_a_path_without_sightings_is_optimized_alone() -> None:
     none = np.zeros(0, int)
     nothing = Sightings((), none, none, np.zeros((0, 2)), np.zeros((0, 2, 2)))
 
-    poses, _ = optimize_jointly(graph, nothing, Config())
+    poses, _ = optimize_jointly(graph, nothing, NOTHING_HEARD, Config())
     assert poses == pytest.approx(optimize(graph))

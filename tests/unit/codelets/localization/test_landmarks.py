@@ -93,3 +93,11 @@ def test_a_landmark_seen_once_and_then_twice_elsewhere_starts_anew_there() -> No
 
     assert known.x_m == pytest.approx(10.0, abs=0.5)
     assert (known.sightings, known.misses) == (1, 0)
+
+
+def test_a_landmark_first_seen_from_afar_and_wrongly_comes_to_where_it_is_seen_from_near() -> None:
+    known = house(25.0, 0.0, 1.5, sightings=1)
+    for number in range(40):
+        known = _seen(known, 0.0, 19.0, number)
+
+    assert known.x_m == pytest.approx(19.0, abs=0.5)

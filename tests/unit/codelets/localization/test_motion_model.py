@@ -147,23 +147,23 @@ def test_two_landmarks_carry_the_agent_off_only_where_their_places_are_sure(
     assert was_moved == is_moved
 
 
-@pytest.mark.parametrize(("evidence", "is_moved"), [(0.95, True), (0.75, False)])
-def test_two_landmarks_carry_the_agent_off_only_where_their_names_are_sure(
-    evidence: float, is_moved: bool
+@pytest.mark.parametrize(("certainty", "is_moved"), [(0.95, True), (0.75, False)])
+def test_two_landmarks_carry_the_agent_off_only_where_it_is_sure_which_ones_they_are(
+    certainty: float, is_moved: bool
 ) -> None:
-    was_moved = _carried(evidence=evidence).odometry.x_m < 0.0
+    was_moved = _carried(certainty=certainty).odometry.x_m < 0.0
     assert was_moved == is_moved
 
 
 @pytest.mark.parametrize(
-    ("labels", "evidence", "is_moved"),
+    ("labels", "certainty", "is_moved"),
     [(THREE, 0.95, True), (THREE, 0.75, False), (TWO, 0.95, False)],
-    ids=["three", "three unsure names", "two"],
+    ids=["three", "three unsure ones", "two"],
 )
 def test_a_few_views_are_enough_where_three_landmarks_agree(
-    labels: tuple[str, ...], evidence: float, is_moved: bool
+    labels: tuple[str, ...], certainty: float, is_moved: bool
 ) -> None:
-    was_moved = _carried(labels=labels, views=4, evidence=evidence).odometry.x_m < 0.0
+    was_moved = _carried(labels=labels, views=4, certainty=certainty).odometry.x_m < 0.0
     assert was_moved == is_moved
 
 

@@ -83,7 +83,7 @@ def test_other_goals_are_next_once_the_need_is_satisfied() -> None:
 
 def test_of_several_places_that_satisfy_a_need_it_goes_to_the_one_with_the_shortest_route() -> None:
     across = Object(
-        id=object_id("charging-place~2"),
+        id=object_id("41a"),
         label="charging-place",
         function="charge",
         x_m=3.0,

@@ -1,0 +1,1 @@
+"""Whether an agent knows each building as one individual, judged by the truth."""

@@ -1,0 +1,125 @@
+"""Keeps the percepts of a drive, and which object of the map each was given to. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.polylines import interpolate
+from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta, DropNode, Link, Links, Phase
+from cogmap.schemas.nodes import SATISFIED_BY, LinkKind, Object, Percept
+from cogmap.schemas.sensing import Percepts, TruePose
+
+
+@dataclass(slots=True)
+class Sight:
+    """A percept of the view of `stamp_ns`; `label` is what its node in the graph is called, and
+    `object` the id of the node that it was given to, empty if it was given to none.
+    """
+
+    stamp_ns: int
+    bearing_rad: float
+    range_m: float
+    label: str = ""
+    object: str = ""
+
+
+class PerceptTally:
+    """Follows percepts, deltas and true poses. `seen` has all that was perceived, but for places to
+    charge at; `entered` has the percepts that came into the agent's graph, with what they were
+    given to. `poses` are the true x_m, y_m and heading_rad by stamp.
+
+    A percept is given to an object by its INSTANCE link, also by one that comes later. One without
+    a link is given to the object that is made of it: the one of its label that enters the map in
+    its cycle.
+    """
+
+    def __init__(self) -> None:
+        self.seen: list[Sight] = []
+        self.entered: list[Sight] = []
+        self.poses: dict[int, tuple[float, float, float]] = {}
+        self._newest: dict[str, Sight] = {}
+        self._known: set[str] = set()
+
+    def update(self, message: Message) -> None:
+        """Take account of one message; one of another kind is ignored."""
+        match message:
+            case TruePose():
+                pose = message.pose
+                self.poses[message.stamp_ns] = (pose.x_m, pose.y_m, pose.heading_rad)
+            case Percepts():
+                for percept in message.objects:
+                    if percept.function not in SATISFIED_BY.values():
+                        sight = Sight(message.stamp_ns, percept.bearing_rad, percept.range_m)
+                        self.seen.append(sight)
+            case Delta():
+                self._on_delta(message)
+
+    def _on_delta(self, delta: Delta) -> None:
+        made = []
+        for operation in delta.operations:
+            match operation:
+                case Percept():
+                    self._on_percept(operation, delta.stamp_ns)
+                case Object() if operation.id not in self._known:
+                    self._known.add(operation.id)
+                    made.append(operation)
+                case Link(kind=LinkKind.INSTANCE):
+                    self._give(operation.source, operation.target)
+                case Links(kind=LinkKind.INSTANCE):
+                    for source, weights in operation.weights.items():
+                        for target in weights:
+                            self._give(source, target)
+                case DropNode():
+                    self._newest.pop(operation.id, None)
+
+        # Those of a map that is recalled are made of no percept.
+        if delta.phase is Phase.OBJECTS:
+            for node in made:
+                self._give_maker(node, delta.stamp_ns)
+
+    def _on_percept(self, node: Percept, stamp_ns: int) -> None:
+        sight = Sight(stamp_ns, node.bearing_rad, node.range_m, node.label)
+        before = self._newest.get(node.id)
+        if before is not None and replace(before, object="") == sight:
+            return
+
+        self._newest[node.id] = sight
+        self.entered.append(sight)
+
+    def _give(self, percept: str, target: str) -> None:
+        sight = self._newest.get(percept)
+        if sight is not None:
+            sight.object = target
+
+    def _give_maker(self, node: Object, stamp_ns: int) -> None:
+        """Give the object that was just made the percept that it was made of."""
+        for sight in self._newest.values():
+            if sight.stamp_ns == stamp_ns and sight.label == node.label and not sight.object:
+                sight.object = node.id
+
+    def places_m(self, sights: Sequence[Sight]) -> Floats:
+        """Return where each of (n,) sights lies in truth, (n, 2), in the world's frame; NaN where
+        it is unknown from where it was seen.
+        """
+        stamps_ns = np.array(sorted(self.poses), np.int64)
+        poses = np.array([self.poses[stamp_ns] for stamp_ns in stamps_ns.tolist()])
+        wanted_ns = np.array([sight.stamp_ns for sight in sights], np.int64)
+        if not len(poses) or not len(wanted_ns):
+            return np.full((len(wanted_ns), 2), np.nan)
+
+        since_s = (stamps_ns - stamps_ns[0]) / 1e9
+        wanted_s = (wanted_ns - stamps_ns[0]) / 1e9
+        poses[:, 2] = np.unwrap(poses[:, 2])
+        x_m, y_m, heading_rad = interpolate(since_s, poses, wanted_s).T
+
+        is_known = (wanted_s >= 0) & (wanted_s <= since_s[-1])
+        direction_rad = heading_rad + [sight.bearing_rad for sight in sights]
+        range_m = np.where(is_known, [sight.range_m for sight in sights], np.nan)
+        ahead_m = range_m * np.cos(direction_rad)
+        left_m = range_m * np.sin(direction_rad)
+        return np.column_stack([x_m + ahead_m, y_m + left_m])

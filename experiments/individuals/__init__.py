@@ -1,0 +1,1 @@
+"""Towns that try whether an agent tells individuals apart, each as the module `sim`."""

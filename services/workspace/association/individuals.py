@@ -1,0 +1,304 @@
+"""Decides of which individual object each percept is a sighting: by place, look and size together.
+
+Against every object of the map stand two possibilities: that the percept is of one that was not met
+yet, and that it is a mistake. What cannot be told yet waits for the next views. That the agent is
+elsewhere than it believes is a possibility too, and the likelier, the longer it is since something
+fitted its map: then percepts are of the objects that they look like, wherever these stand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import count
+
+import msgspec
+import numpy as np
+
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.se2 import compose, moved_by, wrap_angle
+from cogmap.graph.graph import Graph
+from cogmap.graph.likeness import is_new_side, likeness
+from cogmap.schemas import nodes
+from cogmap.schemas.array import Array
+from cogmap.schemas.nodes import POSE_COLUMNS, Object, Self, individual_label
+from cogmap.schemas.sensing import Percept, Percepts
+from cogmap.services.workspace.association.joint import (
+    FARTHEST_M,
+    NONE,
+    Belief,
+    Possible,
+    associate,
+)
+from cogmap.services.workspace.association.known_objects import KnownObjects
+from cogmap.services.workspace.association.looks import Look, look_of
+
+NEAR_M = 12.0
+"""An object stands at most so far from where a percept of it is seen, beside what is uncertain."""
+
+P_SEEN = 0.9
+"""How likely perception finds an object that is in view (detect_recall)."""
+
+NEW_PER_VIEW = 0.2
+"""Objects in a view that were not met before: as many as an exploring agent meets in a town."""
+
+MISTAKES_PER_VIEW = 0.1
+"""Percepts of a view that are of nothing (1 - detect_precision, of three percepts)."""
+
+CERTAIN = 0.9
+"""A percept that is less likely of its object than so waits for the next views."""
+
+KIDNAPPED_PER_S = 1 / 600
+"""How often the agent is elsewhere than it believes, in the life of a robot that is carried about
+now and then."""
+
+P_IS_HERE = 20.0
+"""The agent is where it believes if what it sees is so many times likelier there than elsewhere."""
+
+P_LOCAL = 0.5
+P_DRIFTED = 0.1
+"""How likely the agent stands as surely to what it sees as to what it has seen of late, and how
+likely it has drifted as far as path integration has since the start."""
+
+MAX_DRIFT_M = 3.0
+MAX_TURNED_RAD = 0.3
+"""With more drift no place tells things apart; then only constellations and looks do."""
+
+MIN_VARIANCE = 1e-6
+"""In square metres and radians: less than any pose is known to, so that matrices have inverses."""
+
+MAX_CANDIDATES = 8
+"""Objects that a percept is compared with at most: the nearest."""
+
+LOCAL_SD_M = 0.5
+"""What was learned in the last views stands to the agent as surely as that, however uncertain both
+are on the map."""
+
+GATE = 3.0
+"""Standard deviations within which nearly all normal errors are."""
+
+MAX_REACH_M = 100.0
+"""Objects are looked for so far around at most, so that a lost agent does not look at all."""
+
+ESTABLISHED = 3
+"""An object that was seen so often stands where it is."""
+
+LARGEST_SD_M = 3.0
+"""With a larger standard deviation a place is none: a third of how far buildings stand apart."""
+
+OVERLAP = 0.5
+"""Two objects do not stand nearer than such a share of their widths together."""
+
+
+class Individuals:
+    """The individuals of the map, and the percepts that are taken to be of them."""
+
+    def __init__(self, graph: Graph) -> None:
+        self._graph = graph
+        self.known = KnownObjects(graph)
+
+    def labelled(self, percepts: Percepts, motions: Array) -> Percepts:
+        """Label each of `percepts` by the individual object that it is of; leave out those that
+        wait, or are mistakes. One whose source knows the individual, as by a barcode, has a label.
+
+        `motions` are those since the self node was moved last.
+        """
+        agent = self._graph.agent
+        identified = [percept for percept in percepts.objects if percept.label]
+        seen = [percept for percept in percepts.objects if not percept.label]
+        new_labels = (individual_label(self._graph.cycle + 1, number) for number in count())
+        if not seen:
+            return percepts
+        if agent is None:
+            first = [msgspec.structs.replace(each, label=next(new_labels)) for each in seen]
+            return msgspec.structs.replace(percepts, objects=[*identified, *first])
+
+        belief = belief_of(agent, np.asarray(motions.numpy(), np.float64))
+        looks = [look_of(percept, self.known) for percept in seen]
+        candidates, possible = self._possible(seen, looks, agent, belief)
+        found = associate(possible, belief)
+        is_here = _is_here(found.log_evidence, looks, percepts.stamp_ns, agent)
+
+        taken = {candidates[number].label for number in found.objects.tolist() if number != NONE}
+        taken |= {percept.label for percept in identified}
+        objects = list(identified)
+        for place, percept in enumerate(seen):
+            number = int(found.objects[place])
+            probability = float(found.probability[place])
+            if probability < CERTAIN:
+                continue
+
+            if number != NONE:
+                node = candidates[number]
+                objects.append(_of(percept, node, probability))
+                continue
+
+            alike = looks[place].alike
+            if not is_here and alike is not None and alike.label not in taken:
+                taken.add(alike.label)
+                objects.append(_of(percept, alike, probability))
+            elif is_placed(percept) and self._stands_clear(percept, agent, belief):
+                label = next(new_labels)
+                objects.append(msgspec.structs.replace(percept, label=label))
+
+        return msgspec.structs.replace(percepts, objects=objects)
+
+    def _possible(
+        self, seen: Sequence[Percept], looks: Sequence[Look], agent: Self, belief: Belief
+    ) -> tuple[list[Object], list[Possible]]:
+        """Find the objects that each percept may be of, and how much it looks like them."""
+        candidates: list[Object] = []
+        number_of: dict[str, int] = {}
+        possible = []
+        for percept, look in zip(seen, looks, strict=True):
+            nodes = self._in_reach(percept, agent, belief)
+            for node in nodes:
+                if node.label not in number_of:
+                    number_of[node.label] = len(candidates)
+                    candidates.append(node)
+
+            likenesses = np.array([P_SEEN * likeness(percept, node) for node in nodes])
+            one = Possible(
+                percept=percept,
+                objects=nodes,
+                numbers=np.array([number_of[node.label] for node in nodes], np.int64),
+                log_likeness=np.log(likenesses),
+                log_none=math.log((NEW_PER_VIEW + MISTAKES_PER_VIEW) * look.of_another),
+            )
+            possible.append(one)
+
+        return candidates, possible
+
+    def _in_reach(self, percept: Percept, agent: Self, belief: Belief) -> list[Object]:
+        """Return the objects of the agent's map that stand where a percept may be of them, the
+        nearest MAX_CANDIDATES.
+        """
+        x_m, y_m, _ = belief.means[0].tolist()
+        sd_m = math.sqrt(
+            float(belief.covariances[:, 0, 0].max() + belief.covariances[:, 1, 1].max())
+        )
+        within_m = percept.range_m if percept.has_range else FARTHEST_M
+        if percept.has_bearing and percept.has_range:
+            x_m, y_m = place_m(percept, belief)
+            within_m = 0.0
+
+        within_m += NEAR_M + GATE * math.hypot(percept.range_sd_m, sd_m)
+        nodes = self.known.near(agent.map, x_m, y_m, min(within_m, MAX_REACH_M))
+        nodes.sort(key=lambda node: (math.dist((x_m, y_m), (node.x_m, node.y_m)), node.label))
+        return nodes[:MAX_CANDIDATES]
+
+    def _stands_clear(self, percept: Percept, agent: Self, belief: Belief) -> bool:
+        """Decide whether a percept is of something that may stand where it is seen: two things do
+        not stand in one place. If its place is not known, it may.
+        """
+        if not (percept.has_bearing and percept.has_range):
+            return True
+
+        at_m = place_m(percept, belief)
+        for node in self._in_reach(percept, agent, belief):
+            apart_m = OVERLAP * (percept.width_m + node.width_m) / 2
+            is_established = node.sightings >= ESTABLISHED
+            if is_established and math.dist(at_m, (node.x_m, node.y_m)) < apart_m:
+                return False
+
+        return True
+
+
+def as_entered(percepts: Percepts, graph: Graph) -> Percepts:
+    """Return `percepts` by the labels with which they entered the graph in this cycle, before the
+    workspace was interrupted.
+    """
+    label_of = {}
+    for node in graph.of_kind(nodes.Percept):
+        if node.cycle == graph.cycle:
+            label_of[node.bearing_rad, node.range_m] = node.label
+
+    objects = []
+    for percept in percepts.objects:
+        label = label_of.get((percept.bearing_rad, percept.range_m))
+        if label is not None:
+            objects.append(msgspec.structs.replace(percept, label=label))
+
+    return msgspec.structs.replace(percepts, objects=objects)
+
+
+def belief_of(agent: Self, motions: Floats) -> Belief:
+    """Return what is believed of the agent's pose after (n, 5) `motions`, three ways: as sure as it
+    is to what was learned in the last views, as its samples are, and as path integration since the
+    start is, for the samples may be surer than they are right.
+    """
+    pose = np.array([agent.x_m, agent.y_m, agent.heading_rad])
+    samples = agent.samples.numpy()[:, :POSE_COLUMNS]
+    offsets = samples - pose
+    offsets[:, 2] = wrap_angle(offsets[:, 2])
+    believed = offsets.T @ offsets / len(offsets)
+
+    sd_m = math.hypot(agent.x_sd_m, agent.y_sd_m)
+    local = believed * min(1.0, LOCAL_SD_M / max(sd_m, LOCAL_SD_M)) ** 2
+
+    path = agent.odometry
+    turned_rad2 = min(path.variance_rad2, MAX_TURNED_RAD**2)
+    drifted_m2 = path.variance_m2 + turned_rad2 * (path.x_m**2 + path.y_m**2)
+    drifted_m2 = min(drifted_m2, MAX_DRIFT_M**2)
+    drifted = believed + np.diag([drifted_m2, drifted_m2, turned_rad2])
+
+    moved_sd = motions[:, 3:5] * motions[:, 2:3]
+    moved = np.square(moved_sd).sum(axis=0)
+    step_noise = np.diag([moved[0], moved[0], moved[1]]) + np.eye(3) * MIN_VARIANCE
+    mean = compose(pose, moved_by(np.zeros(3), motions))
+    return Belief(
+        means=np.tile(mean, (3, 1)),
+        covariances=np.stack([local, believed, drifted]) + step_noise,
+        log_weights=np.log([P_LOCAL, 1 - P_LOCAL - P_DRIFTED, P_DRIFTED]),
+    )
+
+
+def place_m(percept: Percept, belief: Belief) -> tuple[float, float]:
+    """Return where something is seen from the pose that is believed."""
+    x_m, y_m, heading_rad = belief.means[0].tolist()
+    direction_rad = heading_rad + percept.bearing_rad
+    return (
+        x_m + percept.range_m * math.cos(direction_rad),
+        y_m + percept.range_m * math.sin(direction_rad),
+    )
+
+
+def _is_here(log_evidence: float, looks: Sequence[Look], now_ns: int, agent: Self) -> bool:
+    """Decide whether the agent is where it believes, by what it sees there, of the logarithm of
+    that likelihood, and how much of that it would see at any other place of its map.
+    """
+    fit = agent.misfits
+    certain_ns = max(fit.last_fit_ns, fit.not_elsewhere_ns, 0)
+    unsure_s = max(0.0, (now_ns - certain_ns) / 1e9)
+    p_elsewhere = min(KIDNAPPED_PER_S * unsure_s, 0.5)
+    if p_elsewhere == 0.0:
+        return True
+
+    log_elsewhere = math.log(p_elsewhere)
+    for look in looks:
+        none = (NEW_PER_VIEW + MISTAKES_PER_VIEW) * look.of_another
+        log_elsewhere += math.log(P_SEEN * look.of_any + none)
+
+    return log_evidence - log_elsewhere > math.log(P_IS_HERE)
+
+
+def is_placed(percept: Percept) -> bool:
+    """Decide whether something that was not met yet may enter the map where it is seen: it waits
+    until it is nearer if its place says nothing of which of its neighbours it is.
+    """
+    if not (percept.has_bearing and percept.has_range):
+        return True
+
+    across_sd_m = percept.range_m * percept.bearing_sd_rad
+    return math.hypot(percept.range_sd_m, across_sd_m) <= LARGEST_SD_M
+
+
+def _of(percept: Percept, node: Object, probability: float) -> Percept:
+    """Label a percept as of an object; an appearance that adds none to those known is left out."""
+    appearance = percept.appearance
+    if appearance is not None and not is_new_side(appearance, node.appearances):
+        appearance = None
+
+    return msgspec.structs.replace(
+        percept, label=node.label, certainty=probability, appearance=appearance
+    )
