@@ -7,7 +7,17 @@ import enum
 from cogmap.geometry.arrays import Floats
 from cogmap.services.sensory.self_motion.motion import Motion, Velocity
 from cogmap.services.sensory.self_motion.visual_odometry import TrackedView, VisualOdometry
-from cogmap.services.sensory.self_motion.wheels import Scale, WheelDoubt, WheelNoise, fuse, spread
+from cogmap.services.sensory.self_motion.wheels import (
+    Scale,
+    WheelDoubt,
+    WheelNoise,
+    contradict,
+    fuse,
+    spread,
+)
+
+FAR_TURNED_RAD = 0.35
+"""Two views so far turned have three quarters of a usual camera's field in common at most."""
 
 STILL = Motion(0.0, 0.0, 0.0, 0.0)
 
@@ -72,6 +82,12 @@ class SelfMotionSense:
             motion = expected if seen is None else seen
             self._velocity = velocity if seen is None else Velocity.of(seen, dt_s)
             return spread(motion, dt_s)
+
+        # A slow machine skips views: of two that show little of the same, the tracks may agree on
+        # a motion that was none.
+        is_far_turned = abs(wheels.turn_rad) > FAR_TURNED_RAD
+        if seen is not None and is_far_turned and contradict(wheels, seen):
+            seen = None
 
         doubted = self._doubt.doubted(wheels, seen, dt_s)
         if seen is None:

@@ -53,6 +53,15 @@ class WheelNoise:
         )
 
 
+def contradict(one: Motion, other: Motion) -> bool:
+    """Decide whether two motions differ by more than both may err."""
+    distance_sd_m = math.hypot(one.distance_sd_m, other.distance_sd_m)
+    turn_sd_rad = math.hypot(one.turn_sd_rad, other.turn_sd_rad)
+    apart_m = abs(one.distance_m - other.distance_m)
+    apart_rad = abs(one.turn_rad - other.turn_rad)
+    return apart_m > SURPRISE_SDS * distance_sd_m or apart_rad > SURPRISE_SDS * turn_sd_rad
+
+
 class WheelDoubt:
     """How much more wheels err than their noise says: they slip, or their sensor lies.
 

@@ -54,6 +54,7 @@ def _drive(
     camera: Calibration = CAMERA,
     scale: float = 1.0,
     wheel_factor: float = 1.0,
+    last_wheel_factor: float | None = None,
     change: dict[int, Image] | None = None,
 ) -> list[SelfMotion]:
     """What the module publishes on a drive, of which `change` has other left images."""
@@ -67,9 +68,13 @@ def _drive(
 
         before = poses[max(0, number - 1)]
         step_m = math.hypot(pose[0] - before[0], pose[1] - before[1])
+        is_last = number == len(poses) - 1
+        factor = wheel_factor
+        if is_last and last_wheel_factor is not None:
+            factor = last_wheel_factor
         wheels = Odometry(
             stamp_ns=stamp_ns,
-            speed_m_s=wheel_factor * step_m / dt_s,
+            speed_m_s=factor * step_m / dt_s,
             turn_rate_rad_s=(pose[2] - before[2]) / dt_s,
             dt_s=dt_s,
         )
@@ -191,6 +196,16 @@ def test_wheels_that_lied_are_doubted_where_the_views_end() -> None:
 
     assert sd_m > 1.2 * honest_sd_m
     assert distance_m < 0.7  # where wheels say 0.9
+
+
+def test_views_far_turned_are_not_believed_against_wheels_that_were_right_so_far() -> None:
+    straight = _bend(6, 0.5)
+    for turn_rad, driven_m in ((0.1, 1.0), (0.45, 0.5)):
+        poses = [*straight, (4.0, 0.0, turn_rad)]
+        motions = _drive(poses, Source.BOTH, dt_s=0.5, last_wheel_factor=0.5)
+
+        rows = np.asarray(motions[-1].motions.numpy())
+        assert float(rows[:, 0] @ rows[:, 2]) == pytest.approx(driven_m, abs=0.15)
 
 
 def test_views_wait_for_no_odometry() -> None:
