@@ -9,7 +9,7 @@ import pytest
 
 from benchmarks.real import stereo
 from cogmap.errors import UsageError
-from tests.support.world.street import CAMERA, pair
+from tests.support.world.stereo_street import CAMERA, pair
 
 STEP_M = 0.5
 FRAMES = 8
