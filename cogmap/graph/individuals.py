@@ -52,6 +52,12 @@ def shares(node: Object) -> dict[str, float]:
     return {name: evidence / total for name, evidence in node.names.items() if name and total}
 
 
+def names_of_both(one: Object, other: Object) -> dict[str, float]:
+    """Return the evidence for each name of two objects that are one."""
+    names = {**one.names, **other.names}
+    return {name: one.names.get(name, 0.0) + other.names.get(name, 0.0) for name in names}
+
+
 def is_among(node: Object, others: Iterable[Object]) -> bool:
     """Return true if an object is the same as one of some others."""
     return any(is_same(node, other) for other in others)

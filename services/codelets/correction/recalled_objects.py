@@ -12,7 +12,7 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.graph import Graph
-from cogmap.graph.individuals import is_same
+from cogmap.graph.individuals import is_same, names_of_both
 from cogmap.schemas.graph import Link, Operation
 from cogmap.schemas.nodes import (
     NEVER_NS,
@@ -96,13 +96,9 @@ def recalled_objects(recalled: Recollection, graph: Graph, pose: Floats) -> list
         )
         here = node_of.get(own)
         if here is not None:
-            names = {
-                name: here.names.get(name, 0.0) + there.names.get(name, 0.0)
-                for name in {**there.names, **here.names}
-            }
             node = msgspec.structs.replace(
                 here,
-                names=names,
+                names=names_of_both(there, here),
                 given_name=here.given_name or there.given_name,
                 base_level=1.0,
                 cycle=graph.cycle,

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from cogmap.graph.graph import Graph
-from cogmap.graph.individuals import is_same, reach_m
+from cogmap.graph.individuals import is_same, names_of_both, reach_m
 from cogmap.graph.likeness import MAX_APPEARANCES
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
 from cogmap.schemas.array import Matrix
@@ -108,10 +108,6 @@ def merged(kept: Object, gone: Object) -> Object:
     weight = gone.sightings / (kept.sightings + gone.sightings)
     x_m = kept.x_m + weight * (gone.x_m - kept.x_m)
     y_m = kept.y_m + weight * (gone.y_m - kept.y_m)
-    names = {
-        name: kept.names.get(name, 0.0) + gone.names.get(name, 0.0)
-        for name in {**kept.names, **gone.names}
-    }
 
     sides = [each.appearances.numpy() for each in (kept, gone) if each.appearances is not None]
     appearances = None
@@ -120,7 +116,7 @@ def merged(kept: Object, gone: Object) -> Object:
 
     return msgspec.structs.replace(
         kept,
-        names=names,
+        names=names_of_both(kept, gone),
         given_name=kept.given_name or gone.given_name,
         appearances=appearances,
         function=kept.function or gone.function,

@@ -18,6 +18,7 @@ import numpy as np
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose, moved_by, wrap_angle
 from cogmap.graph.graph import Graph
+from cogmap.graph.individuals import OVERLAP
 from cogmap.graph.likeness import is_new_side, likeness
 from cogmap.schemas import nodes
 from cogmap.schemas.array import Array
@@ -85,9 +86,6 @@ ESTABLISHED = 3
 
 LARGEST_SD_M = 3.0
 """With a larger standard deviation a place is none: a third of how far buildings stand apart."""
-
-OVERLAP = 0.5
-"""Two objects do not stand nearer than such a share of their widths together."""
 
 
 class Individuals:
