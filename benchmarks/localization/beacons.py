@@ -20,6 +20,7 @@ from cogmap.data.plaza import RangeLog, read
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import Percept
+from cogmap.services.player.public import sighting
 
 THRESHOLDS: Thresholds = {"slam_rmse_over_gtsam": at_most(1.2)}
 # What is assumed of a radio. By the surveyed beacons these scatter by 0.54 m about a gain of 7 %.
@@ -114,19 +115,12 @@ def moments(log: RangeLog) -> Iterator[Moment]:
 
 def percept_of(number: int, range_m: float) -> Percept:
     """Make a percept of a beacon at a range, in a direction that is unknown."""
-    return Percept(
-        name=f"beacon-{number}",
-        label=f"beacon-{number}",
-        activation=1.0,
-        evidence=1.0,
-        bearing_rad=0.0,
-        range_m=range_m,
+    return sighting(
+        f"beacon-{number}",
+        0.0,
+        range_m,
         bearing_sd_rad=UNKNOWN_BEARING_SD_RAD,
         range_sd_m=RANGE_SD_M,
-        width_m=0.0,
-        height_m=0.0,
-        whole=True,
-        box_px=(0, 0, 0, 0),
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from cogmap.data.mrclam import Robot
 from cogmap.geometry.arrays import Floats
 from cogmap.schemas.sensing import Percept
-from cogmap.services.player.public import Delay, WheelNoise, Wheels
+from cogmap.services.player.public import Delay, WheelNoise, Wheels, sighting
 from cogmap.services.sensory.public import SensoryConfig
 
 TICK_S = 0.2
@@ -41,19 +41,12 @@ def label_of(subject: int) -> str:
 
 def seen(label: str, bearing_rad: float, range_m: float) -> Percept:
     """Make a percept with the benchmark's noise: 3 % of the distance, as the paper's, and 1°."""
-    return Percept(
-        name=label,
-        label=label,
-        activation=1.0,
-        evidence=1.0,
-        bearing_rad=bearing_rad,
-        range_m=range_m,
+    return sighting(
+        label,
+        bearing_rad,
+        range_m,
         bearing_sd_rad=BEARING_SD_RAD,
         range_sd_m=RANGE_NOISE * range_m,
-        width_m=0.0,
-        height_m=0.0,
-        whole=True,
-        box_px=(0, 0, 0, 0),
     )
 
 

@@ -22,6 +22,7 @@ from cogmap.data.victoria_park import LASER_AHEAD_M, LASER_LEFT_M, TreeLog, read
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose
 from cogmap.schemas.sensing import Percept
+from cogmap.services.player.public import sighting
 
 THRESHOLDS: Thresholds = {
     "gps_rmse_over_gtsam": at_most(1.0),
@@ -127,17 +128,13 @@ def moments(log: TreeLog) -> Iterator[Moment]:
 def percept_of(row: Floats) -> Percept:
     """Make a percept of a trunk, which has no name: stamp, range, bearing, diameter."""
     _, range_m, bearing_rad, diameter_m = row.tolist()
-    return Percept(
-        activation=1.0,
-        evidence=1.0,
-        bearing_rad=bearing_rad,
-        range_m=range_m,
+    return sighting(
+        "",
+        bearing_rad,
+        range_m,
         bearing_sd_rad=BEARING_SD_RAD,
         range_sd_m=RANGE_SD_M,
         width_m=diameter_m,
-        height_m=0.0,
-        whole=True,
-        box_px=(0, 0, 0, 0),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cogmap.services.player.landmark_logs.delay import Delay
+from cogmap.services.player.landmark_logs.sightings import sighting
 from cogmap.services.player.landmark_logs.wheels import WheelNoise, Wheels
 
-__all__ = ["Delay", "WheelNoise", "Wheels"]
+__all__ = ["Delay", "WheelNoise", "Wheels", "sighting"]
