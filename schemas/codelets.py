@@ -6,6 +6,8 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.base import Count, Message, Name, Part
 from cogmap.schemas.cognition import Coalition, Event
 from cogmap.schemas.graph import Operation
+from cogmap.schemas.nodes import NEVER_NS
+from cogmap.schemas.nodes.base import Stamp
 from cogmap.schemas.sensing import Percept, PlaceMatch
 
 
@@ -13,8 +15,9 @@ class Task(Message, kw_only=True, frozen=True):
     """Work for one codelet: what it is about, and what was sensed. All else is in the graph.
 
     It reads the graph at `version`, or newer. `about` are ids of nodes. `motions` is as in
-    SelfMotion; `road_m` and `road_boundary_m` as in Percepts. `scan`, float32 (n, 2), has bearing
-    and range of each ray of the view's RangeScan; range 0 is nothing seen.
+    SelfMotion, from `since_ns` on: of an agent that was moved later the beginning is done already.
+    `road_m` and `road_boundary_m` are as in Percepts. `scan`, float32 (n, 2), has bearing and range
+    of each ray of the view's RangeScan; range 0 is nothing seen.
     """
 
     task_id: Name
@@ -25,6 +28,7 @@ class Task(Message, kw_only=True, frozen=True):
     percepts: list[Percept] = []
     matches: list[PlaceMatch] = []
     motions: Array | None = None
+    since_ns: Stamp = NEVER_NS
     road_m: Array | None = None
     road_boundary_m: Array | None = None
     scan: Array | None = None

@@ -14,7 +14,7 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.cognition import Coalition, Event
 from cogmap.schemas.graph import Operation, Phase
-from cogmap.schemas.nodes import GraphNode, LinkKind, PlaceColumn
+from cogmap.schemas.nodes import NEVER_NS, GraphNode, LinkKind, PlaceColumn
 from cogmap.schemas.sensing import Percept, Percepts, PlaceMatch, RangeScan
 
 ENTRY_POINTS = "cogmap.codelets"
@@ -26,7 +26,7 @@ Written = type[GraphNode] | LinkKind | PlaceColumn
 @dataclass(frozen=True)
 class CycleContext:
     """What a cognitive cycle is about: a view's percepts, the self-motion since the self node was
-    last moved, as in SelfMotion, and the range scan of the view, where there is one.
+    last moved at `since_ns`, as in SelfMotion, and the range scan of the view, where there is one.
     """
 
     cycle: int
@@ -34,6 +34,7 @@ class CycleContext:
     motions: Array
     version: int = 0
     scan: RangeScan | None = None
+    since_ns: int = NEVER_NS
 
     @property
     def stamp_ns(self) -> int:
@@ -77,6 +78,7 @@ class CycleContext:
             percepts=list(percepts),
             matches=list(matches),
             motions=self.motions if with_motions else None,
+            since_ns=self.since_ns if with_motions else NEVER_NS,
             road_m=self.percepts.road_m if with_road else None,
             road_boundary_m=self.percepts.road_boundary_m if with_boundary else None,
             scan=rays,

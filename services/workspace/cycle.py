@@ -248,9 +248,10 @@ class Workspace:
         graph = self._ledger.graph
         if self._is_interrupted(percepts):
             self._waiting = None
-            motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
             entered = as_entered(percepts, graph)
-            self._context = self._sensed.context(entered, motions, graph.cycle, graph.version)
+            self._context = self._sensed.context(
+                entered, self._moved_until_ns, graph.cycle, graph.version
+            )
             self._phase = PLACE_OF.get(graph.phase, -1)
             return self._next_phase()
 
@@ -269,9 +270,10 @@ class Workspace:
         self._waiting = None
         before_ns = self._begun_ns
         self._begun_ns = percepts.stamp_ns
-        motions = self._sensed.motions(percepts.stamp_ns, self._moved_until_ns)
+        moved_ns = self._moved_until_ns
+        motions = self._sensed.motions(percepts.stamp_ns, moved_ns)
         entered = self._individuals.labelled(percepts, motions)
-        self._context = self._sensed.context(entered, motions, graph.cycle + 1, graph.version)
+        self._context = self._sensed.context(entered, moved_ns, graph.cycle + 1, graph.version)
         self._phase = -1
         self._is_repeated = False
 

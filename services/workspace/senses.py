@@ -197,10 +197,13 @@ class Sensed:
         """Return the body's needs at the view at `stamp_ns`."""
         return self._body.needs(stamp_ns, cycle)
 
-    def context(self, percepts: Percepts, motions: Array, cycle: int, version: int) -> CycleContext:
-        """Gather all that was sensed for the view of `percepts`; its scan is taken now."""
+    def context(self, percepts: Percepts, moved_ns: int, cycle: int, version: int) -> CycleContext:
+        """Gather all that was sensed for the view of `percepts`, since the self node was moved
+        last; its scan is taken now.
+        """
+        motions = self.motions(percepts.stamp_ns, moved_ns)
         scan = self._scans.take(percepts.stamp_ns)
-        return CycleContext(cycle, percepts, motions, version, scan)
+        return CycleContext(cycle, percepts, motions, version, scan, moved_ns)
 
     def discard(self, moved_ns: int) -> None:
         """Discard what has moved the self node."""

@@ -96,6 +96,9 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     rng = generator(task.task_id)
     motions = np.asarray(task.motions.numpy(), np.float64)
+    if agent.stamp_ns > task.since_ns:
+        # An answer that came late has moved the agent since this task was made.
+        motions = _later(motions, (task.stamp_ns - agent.stamp_ns) * 1e-9)
     before = with_gains(agent.samples.numpy(), config, rng)
     moved = move(resample(before, config.samples, 0.0, rng), motions, config, rng)
     moved_sd = motions[:, 3:5] * motions[:, 2:3]
@@ -205,6 +208,15 @@ def correct(
         compared = compare(samples, seen)
 
     return Estimate(kept, share)
+
+
+def _later(motions: Floats, duration_s: float) -> Floats:
+    """Return the rows of self-motion in the last `duration_s`, by their own durations."""
+    durations_s = motions[:, 2]
+    until_end_s = np.cumsum(durations_s[::-1])[::-1]
+    middle_s = until_end_s - durations_s / 2
+    later: Floats = motions[middle_s < duration_s]
+    return later
 
 
 def _self_node(task: Task, agent: Self, found: Estimate) -> Self:

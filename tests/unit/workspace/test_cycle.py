@@ -207,6 +207,7 @@ def test_a_task_names_what_it_is_about_and_the_version_to_read() -> None:
     assert asked.version == desk.deltas[-1].version
     assert asked.motions is not None
     assert asked.motions.shape == (1, 5)
+    assert asked.since_ns == stamp_ns(0)
     assert desk.graph.cell_m() == 2.0
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from cogmap.runtime.run import REAL_TIME
 from cogmap.schemas.codelets import Task
-from cogmap.schemas.nodes import Self
+from cogmap.schemas.nodes import NEVER_NS, Self
 from cogmap.schemas.process import Presence
 from cogmap.services.codelets.sub_maps.coarse_places import EVERY_CYCLES
 from cogmap.services.workspace.dispatch import MAX_ATTEMPTS
@@ -329,6 +329,7 @@ def test_unused_motion_is_given_to_the_next_cycles_localization() -> None:
 
     assert asked.motions is not None
     assert asked.motions.shape == (2, 5)
+    assert asked.since_ns == NEVER_NS, "no answer has moved the agent"
 
 
 def test_workers_that_never_answer_leave_the_deltas_without_a_gap() -> None:

@@ -54,6 +54,22 @@ def test_without_landmarks_the_samples_move_by_the_motion() -> None:
     assert pose_of(again) == pytest.approx((2.0, 3.0, math.pi / 2))
 
 
+def test_motion_that_a_late_answer_has_moved_the_agent_by_does_not_move_it_again() -> None:
+    at_one_second = agent([(2.0, 0.0, 0.0)] * 200, stamp_ns=1_000_000_000)
+    two_metres = (2.0, 0.0, 1.0, 0.0, 0.0)
+    three_metres = (3.0, 0.0, 1.0, 0.0, 0.0)
+
+    found = localized(
+        at_one_second,
+        motions=motions(two_metres, three_metres),
+        since_ns=0,
+        stamp_ns=2_000_000_000,
+    )
+
+    assert pose_of(found) == pytest.approx((5.0, 0.0, 0.0))
+    assert found.odometry.x_m == pytest.approx(3.0)
+
+
 def test_a_quarter_circle_ends_where_its_chord_does() -> None:
     step = (math.pi / 2, math.pi / 2, 0.05, 0.0, 0.0)
     found = localized(agent(), motions=motions(*[step] * 20))
@@ -209,6 +225,7 @@ def test_the_number_of_samples_does_not_fall_from_one_task_to_the_next() -> None
             config=Config(),
             identifier=f"{frame}/localization",
             motions=motions((1.0, 0.0, 0.2, 0.1, 0.02)),
+            since_ns=current.stamp_ns,
             percepts=[percept("house", 0.0, range_m)],
         )
         assert len(samples_of(current)) >= 50

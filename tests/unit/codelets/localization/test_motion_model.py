@@ -74,8 +74,14 @@ def _move(
     agent: Self, number: int, landmarks: list[Object], seen: Iterable[Percept], config: Config
 ) -> Self:
     """The agent after a step of a metre and a look."""
-    facts = {"motions": Array.of(A_METRE), "percepts": list(seen), "stamp_ns": number}
-    asked = task("localization", f"{number}/l", **facts)
+    asked = task(
+        "localization",
+        f"{number}/l",
+        motions=Array.of(A_METRE),
+        since_ns=agent.stamp_ns,
+        percepts=list(seen),
+        stamp_ns=number,
+    )
 
     found, _ = run(asked, graph_of(agent, *landmarks), config).operations
     assert isinstance(found, Self)
