@@ -169,7 +169,8 @@ def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float)
 
     # How far apart the two views' points are on either pass, in squared Mahalanobis distance.
     difference_m = path.between_m(one.there, other.there) - path.between_m(one.here, other.here)
-    squared = difference_m**2 / (one.sd_m**2 + other.sd_m**2 + path_m2)
+    variance_m2 = one.sd_m**2 + other.sd_m**2 + path_m2
+    squared = difference_m**2 / variance_m2
 
     # The turn between the two views on either pass, if both know their heading.
     has_heading = one.has_heading & other.has_heading
@@ -183,7 +184,7 @@ def _agree(one: Views, other: Views, path: _DeadReckoning, false_closure: float)
     degrees = np.where(has_heading, 3, 2)
     is_consistent = squared <= chdtri(degrees, false_closure)
 
-    is_near = path_m2 <= MAX_SD_M**2
+    is_certain = variance_m2 <= MAX_SD_M**2
     is_apart = one.j != other.j
-    agree: Booleans = is_consistent & is_near & is_apart
+    agree: Booleans = is_consistent & is_certain & is_apart
     return agree
