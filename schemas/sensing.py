@@ -179,6 +179,7 @@ class Percepts(Message, kw_only=True, frozen=True):
 
     `road_m` and `road_boundary_m`: float32 (n, 2), ground points seen as road, and where it ends,
     in the robot's frame, x forward, y left. `matches` has at most one remembered view.
+    `calibration` is that of the view, None for a sense without one.
     """
 
     frame: Count
@@ -186,6 +187,7 @@ class Percepts(Message, kw_only=True, frozen=True):
     road_m: Array
     road_boundary_m: Array = msgspec.field(default_factory=_no_points)
     matches: list[PlaceMatch] = []
+    calibration: Calibration | None = None
 
 
 class RememberedView(Part, kw_only=True, frozen=True):

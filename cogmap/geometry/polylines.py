@@ -53,6 +53,28 @@ def nearest_on_line(line_m: Floats, points_m: Floats) -> Nearest:
     return nearest_on_pieces(line_m[:-1], line_m[1:], points_m)
 
 
+def crossings_of(
+    starts_m: Floats, ends_m: Floats, from_m: Floats, directions_rad: Floats
+) -> Floats:
+    """Return how far from the point `from_m` (2,) a ray in each of (k,) directions crosses each of
+    m straight pieces, from (m, 2) `starts_m` to `ends_m`: (k, m) in metres, infinity where it does
+    not.
+    """
+    along = np.column_stack([np.cos(directions_rad), np.sin(directions_rad)])
+    pieces_m = ends_m - starts_m
+    offset_m = starts_m - from_m
+
+    # A ray and a piece cross at `range_m` along the ray and at `share` of the piece.
+    cross_m = along[:, :1] * pieces_m[:, 1] - along[:, 1:] * pieces_m[:, 0]
+    reach = offset_m[:, 0] * pieces_m[:, 1] - offset_m[:, 1] * pieces_m[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        range_m = reach / cross_m
+        share = (along[:, 1:] * offset_m[:, 0] - along[:, :1] * offset_m[:, 1]) / cross_m
+
+    is_crossed = (range_m > 0) & (share >= 0) & (share <= 1)
+    return np.where(is_crossed, range_m, np.inf)
+
+
 def nearest_on_pieces(starts_m: Floats, ends_m: Floats, points_m: Floats) -> Nearest:
     """Return the nearest of m straight pieces, from (m, 2) `starts_m` to `ends_m`, to each of (k,
     2) points.

@@ -107,6 +107,7 @@ class Perception:
             stamp_ns=view.stamp_ns,
             frame=view.frame,
             objects=[self._primer.felt(percept) for percept in perceived.objects],
+            calibration=view.calibration,
             road_m=Array.of(perceived.road_m),
             road_boundary_m=Array.of(perceived.road_boundary_m),
             matches=matches,

@@ -12,18 +12,21 @@ from cogmap.geometry.polylines import interpolate
 from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta, DropNode, Link, Links, Phase
 from cogmap.schemas.nodes import SATISFIED_BY, LinkKind, Object, Percept
-from cogmap.schemas.sensing import Percepts, TruePose
+from cogmap.schemas.sensing import Calibration, Percepts, TruePose
 
 
 @dataclass(slots=True)
 class Sight:
     """A percept of the view of `stamp_ns`; `label` is what its node in the graph is called, and
-    `object` the id of the node that it was given to, empty if it was given to none.
+    `object` the id of the node that it was given to, empty if it was given to none. `outline_px` is
+    its outline in the view of a camera that has this `calibration`.
     """
 
     stamp_ns: int
     bearing_rad: float
     range_m: float
+    outline_px: tuple[tuple[int, int], ...] = ()
+    calibration: Calibration | None = None
     label: str = ""
     object: str = ""
 
@@ -44,6 +47,7 @@ class PerceptTally:
         self.poses: dict[int, tuple[float, float, float]] = {}
         self._newest: dict[str, Sight] = {}
         self._known: set[str] = set()
+        self._perceived: dict[tuple[int, float, float], Sight] = {}
 
     def update(self, message: Message) -> None:
         """Take account of one message; one of another kind is ignored."""
@@ -54,7 +58,9 @@ class PerceptTally:
             case Percepts():
                 for percept in message.objects:
                     if percept.function not in SATISFIED_BY.values():
-                        sight = Sight(message.stamp_ns, percept.bearing_rad, percept.range_m)
+                        key = (message.stamp_ns, percept.bearing_rad, percept.range_m)
+                        sight = Sight(*key, tuple(percept.outline_px), message.calibration)
+                        self._perceived[key] = sight
                         self.seen.append(sight)
             case Delta():
                 self._on_delta(message)
@@ -83,7 +89,9 @@ class PerceptTally:
                 self._give_maker(node, delta.stamp_ns)
 
     def _on_percept(self, node: Percept, stamp_ns: int) -> None:
-        sight = Sight(stamp_ns, node.bearing_rad, node.range_m, node.label)
+        key = (stamp_ns, node.bearing_rad, node.range_m)
+        perceived = self._perceived.get(key, Sight(*key))
+        sight = replace(perceived, label=node.label)
         before = self._newest.get(node.id)
         if before is not None and replace(before, object="") == sight:
             return
@@ -102,24 +110,20 @@ class PerceptTally:
             if sight.stamp_ns == stamp_ns and sight.label == node.label and not sight.object:
                 sight.object = node.id
 
-    def places_m(self, sights: Sequence[Sight]) -> Floats:
-        """Return where each of (n,) sights lies in truth, (n, 2), in the world's frame; NaN where
-        it is unknown from where it was seen.
+    def true_poses(self, sights: Sequence[Sight]) -> Floats:
+        """Return the true poses that (n,) sights were seen from, (n, 3), in the world's frame; NaN
+        where they are unknown.
         """
         stamps_ns = np.array(sorted(self.poses), np.int64)
         poses = np.array([self.poses[stamp_ns] for stamp_ns in stamps_ns.tolist()])
         wanted_ns = np.array([sight.stamp_ns for sight in sights], np.int64)
         if not len(poses) or not len(wanted_ns):
-            return np.full((len(wanted_ns), 2), np.nan)
+            return np.full((len(wanted_ns), 3), np.nan)
 
         since_s = (stamps_ns - stamps_ns[0]) / 1e9
         wanted_s = (wanted_ns - stamps_ns[0]) / 1e9
         poses[:, 2] = np.unwrap(poses[:, 2])
-        x_m, y_m, heading_rad = interpolate(since_s, poses, wanted_s).T
+        known = interpolate(since_s, poses, wanted_s)
 
         is_known = (wanted_s >= 0) & (wanted_s <= since_s[-1])
-        direction_rad = heading_rad + [sight.bearing_rad for sight in sights]
-        range_m = np.where(is_known, [sight.range_m for sight in sights], np.nan)
-        ahead_m = range_m * np.cos(direction_rad)
-        left_m = range_m * np.sin(direction_rad)
-        return np.column_stack([x_m + ahead_m, y_m + left_m])
+        return np.where(is_known[:, None], known, np.nan)

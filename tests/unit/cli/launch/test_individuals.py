@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -15,6 +16,7 @@ from cogmap.cli.launch.tally import Tally
 from cogmap.errors import NoAnswerError
 from cogmap.graph.graph import Graph
 from cogmap.graph.replica import Fetched, Replica
+from cogmap.robot import calibration
 from cogmap.schemas.graph import Delta, DropNode, Link, Links, Operation, Phase, SnapshotRequest
 from cogmap.schemas.nodes import LinkKind, Object, Percept
 from cogmap.schemas.sensing import Building, Pose, TruePose, TrueTown
@@ -245,3 +247,26 @@ def test_without_the_true_town_the_headline_claims_nothing() -> None:
 
     assert metrics.buildings is None
     assert headline(metrics) == "1 on the map; the true ones are not known"
+
+
+def test_a_percept_of_a_camera_shows_what_most_of_its_outline_does() -> None:
+    """From 20 m south of the inn: its gable, and a tall tower behind it that looks over it."""
+    tower = msgspec.structs.replace(building("tower", (100.0, 90.0)), height_m=18.0)
+    buildings = Buildings(TrueTown(seed=1, streets=[], buildings=[*TOWN.buildings, tower]))
+    pose = np.array([100.0, 50.0, math.pi / 2])
+    camera = calibration()
+
+    def shown(top_px: int, bottom_px: int) -> int:
+        outline_px = [(155, top_px), (165, top_px), (165, bottom_px), (155, bottom_px)]
+        return buildings.shown_in(pose, outline_px, camera)
+
+    horizon_px = round(camera.cy_px)
+    assert shown(horizon_px - 20, horizon_px + 5) == 0
+    assert shown(horizon_px - 85, horizon_px - 70) == 2
+    assert shown(0, 10) == NOTHING
+
+
+def test_an_outline_without_an_area_shows_nothing() -> None:
+    pose = np.array([100.0, 50.0, math.pi / 2])
+
+    assert Buildings(TOWN).shown_in(pose, [(150, 100), (160, 100)], calibration()) == NOTHING
