@@ -115,7 +115,7 @@ class Individuals:
         looks = [look_of(percept, self.known) for percept in seen]
         candidates, possible = self._possible(seen, looks, agent, belief)
         found = associate(possible, belief)
-        is_here = _is_here(found.log_evidence, looks, percepts.stamp_ns, agent)
+        is_here = _is_here(possible, looks, belief, percepts.stamp_ns, agent)
 
         taken = {candidates[number].label for number in found.objects.tolist() if number != NONE}
         taken |= {percept.label for percept in identified}
@@ -261,23 +261,28 @@ def place_m(percept: Percept, belief: Belief) -> tuple[float, float]:
     )
 
 
-def _is_here(log_evidence: float, looks: Sequence[Look], now_ns: int, agent: Self) -> bool:
-    """Decide whether the agent is where it believes, by what it sees there, of the logarithm of
-    that likelihood, and how much of that it would see at any other place of its map.
+def _is_here(
+    possible: Sequence[Possible], looks: Sequence[Look], belief: Belief, now_ns: int, agent: Self
+) -> bool:
+    """Decide whether the agent is where it believes, by how likely what it sees is there, and how
+    likely at any other place of its map. What is too far to enter the map says nothing of that: it
+    may well stand here and be on no map.
     """
     fit = agent.misfits
     certain_ns = max(fit.last_fit_ns, fit.not_elsewhere_ns, 0)
     unsure_s = max(0.0, (now_ns - certain_ns) / 1e9)
     p_elsewhere = min(KIDNAPPED_PER_S * unsure_s, 0.5)
-    if p_elsewhere == 0.0:
+    placed = [place for place, each in enumerate(possible) if is_placed(each.percept)]
+    if p_elsewhere == 0.0 or not placed:
         return True
 
     log_elsewhere = math.log(p_elsewhere)
-    for look in looks:
-        none = (NEW_PER_VIEW + MISTAKES_PER_VIEW) * look.of_another
-        log_elsewhere += math.log(P_SEEN * look.of_any + none)
+    for place in placed:
+        none = (NEW_PER_VIEW + MISTAKES_PER_VIEW) * looks[place].of_another
+        log_elsewhere += math.log(P_SEEN * looks[place].of_any + none)
 
-    return log_evidence - log_elsewhere > math.log(P_IS_HERE)
+    here = associate([possible[place] for place in placed], belief)
+    return here.log_evidence - log_elsewhere > math.log(P_IS_HERE)
 
 
 def is_placed(percept: Percept) -> bool:

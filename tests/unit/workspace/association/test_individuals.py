@@ -141,6 +141,16 @@ def test_where_nothing_fits_and_the_agent_may_be_elsewhere_it_is_of_what_it_look
     assert _labels(known, *seen, frame=UNSURE_FRAME) == ["41a", "52b"]
 
 
+def test_what_is_too_far_to_enter_the_map_does_not_tell_that_the_agent_is_elsewhere() -> None:
+    known = [_house("41a", 20.0, 0.0, name="inn"), _house("52b", 30.0, 0.0, name="mill")]
+    far = (
+        _sight("inn", 0.0, 70.0, range_sd_m=5.0),
+        _sight("mill", 20.0, 70.0, range_sd_m=5.0),
+    )
+
+    assert _labels(known, *far, frame=UNSURE_FRAME) == [WAITS, WAITS]
+
+
 def test_where_nothing_fits_but_the_agent_cannot_be_elsewhere_it_is_of_new_objects() -> None:
     known = [_house("41a", 20.0, 0.0, name="inn"), _house("52b", 30.0, 0.0, name="mill")]
     seen = (_sight("inn", 0.0, 20.0), _sight("mill", 0.0, 32.0))
