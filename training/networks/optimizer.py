@@ -5,6 +5,7 @@ rate, on one thread.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -18,16 +19,28 @@ def seed_torch(seed: int) -> None:
     torch.set_num_threads(1)
 
 
+def training_device() -> torch.device:
+    """Return the GPU, if there is one, else the processor. On a GPU one seed no longer gives
+    exactly the same weights: not all that training needs is computed in a fixed order there.
+    """
+    if not torch.cuda.is_available():
+        return torch.device("cpu")
+
+    torch.use_deterministic_algorithms(mode=False)
+    return torch.device("cuda")
+
+
 class Optimizer:
     """AdamW (Loshchilov & Hutter 2019), whose learning rate rises to `max_rate` in the share
-    `warm_up` of all steps and then falls (Smith & Topin 2019).
+    `warm_up` of all steps and then falls (Smith & Topin 2019). Parameters in groups have one such
+    rate a group.
     """
 
     def __init__(
         self,
-        parameters: Iterable[nn.Parameter],
+        parameters: Iterable[nn.Parameter] | Iterable[dict[str, Any]],
         steps: int,
-        max_rate: float,
+        max_rate: float | list[float],
         weight_decay: float,
         warm_up: float = 0.1,
     ) -> None:

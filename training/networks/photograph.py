@@ -1,5 +1,5 @@
-"""The networks for photographs: a small decoder over an encoder that is not trained further, with
-one output for the road and one for buildings.
+"""The networks for photographs: a small decoder over an encoder that others have trained, with one
+output for the road and one for buildings.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from cogmap.training.networks.encoder import FEATURES, Encoder
+from cogmap.training.photographs import BUILDING, ROAD, UNLABELLED
 
 WIDTH = 48
 POSITIONS = 2
@@ -27,9 +28,12 @@ class Decoder(nn.Module):
     (n, 4, h / 2, w / 2).
 
     Features are added from the coarser to the finer ones (Lin et al. 2017, feature pyramid), with
-    the mean of the whole image for its light. Only where a building is parted from the next depends
-    on depth, as no photograph that shows what is a building has any; what is learned of that does
-    not change what road and buildings are found by.
+    the mean of the whole image for its light. Road and buildings are two of all CamVid's classes:
+    what else a pixel may show is learned with them.
+
+    Only where a building is parted from the next depends on depth, as no photograph that shows what
+    is a building has any; what is learned of that does not change what road and buildings are found
+    by.
     """
 
     def __init__(self) -> None:
@@ -39,8 +43,7 @@ class Decoder(nn.Module):
         self.whole = nn.Conv2d(FEATURES[-1], WIDTH, 1)
         self.around = nn.Sequential(_separable(WIDTH), _separable(WIDTH, dilation=2))
         self.mixed = nn.ModuleList(_separable(WIDTH) for _ in FEATURES)
-        self.road_head = nn.Conv2d(WIDTH, 1, 1)
-        self.building_head = nn.Conv2d(WIDTH, 1, 1)
+        self.class_head = nn.Conv2d(WIDTH, UNLABELLED, 1)
 
         self.depth = nn.Sequential(nn.Conv2d(DEPTHS, WIDTH, 3, padding=1), nn.ReLU())
         self.instance = nn.Sequential(
@@ -49,17 +52,18 @@ class Decoder(nn.Module):
 
     def forward(
         self, features: Sequence[Tensor], positions: Tensor, depth: Tensor
-    ) -> tuple[Tensor, Tensor, Tensor]:
-        """Return log odds of road and of buildings, (n, 1, h / 2, w / 2) each, and the second
-        output of the first examples, as many as `depth` has.
+    ) -> tuple[Tensor, Tensor]:
+        """Return the unnormalized log probability of each class, (n, UNLABELLED, h / 2, w / 2), and
+        the second output of the first examples, as many as `depth` has.
         """
         values = self._joined(features, positions)
-        building = _enlarged(self.building_head(values), 2)
-        return self._road(values), building, self._shown(values[: len(depth)], depth)
+        classes = _enlarged(self.class_head(values), 2)
+        return classes, self._shown(values[: len(depth)], depth)
 
     def road(self, features: Sequence[Tensor], positions: Tensor) -> Tensor:
         """Return the first output alone."""
-        return self._road(self._joined(features, positions))
+        values = self._joined(features, positions)
+        return _enlarged(log_odds(self.class_head(values), ROAD), 2)
 
     def shown(self, features: Sequence[Tensor], positions: Tensor, depth: Tensor) -> Tensor:
         """Return the second output alone."""
@@ -77,12 +81,18 @@ class Decoder(nn.Module):
 
         return values
 
-    def _road(self, values: Tensor) -> Tensor:
-        return _enlarged(self.road_head(values), 2)
-
     def _shown(self, values: Tensor, depth: Tensor) -> Tensor:
         instance = self.instance(torch.cat([values.detach(), self.depth(depth)], dim=1))
-        return _enlarged(torch.cat([self.building_head(values), instance], dim=1), 2)
+        building = log_odds(self.class_head(values), BUILDING)
+        return _enlarged(torch.cat([building, instance], dim=1), 2)
+
+
+def log_odds(classes: Tensor, number: int) -> Tensor:
+    """Return the log odds (n, 1, h, w) of one class by the unnormalized log probabilities of all,
+    (n, classes, h, w).
+    """
+    others = torch.cat([classes[:, :number], classes[:, number + 1 :]], dim=1)
+    return classes[:, number : number + 1] - torch.logsumexp(others, 1, keepdim=True)
 
 
 class RoadNet(nn.Module):

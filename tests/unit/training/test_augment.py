@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cogmap.training.augment import Augmentation, LabelledImage, augmented
+from cogmap.training.augment import Augmentation, LabelledImage, augmented, augmented_classes
 
 SIZE = (180, 240)
 STILL = Augmentation(
@@ -30,7 +30,7 @@ def labelled() -> LabelledImage:
     road[90:] = 255
     image = np.where(road[..., None] > 0, 200, 60).astype(np.uint8)
     known = np.full(SIZE, 255, np.uint8)
-    return LabelledImage(image.repeat(3, axis=2), road, 255 - road, known)
+    return LabelledImage(image.repeat(3, axis=2), road, known)
 
 
 def _varied(labelled: LabelledImage, how: Augmentation, seed: int) -> LabelledImage:
@@ -47,8 +47,6 @@ def test_on_a_slope_the_label_moves_with_the_image(labelled: LabelledImage, seed
     is_bright = sloped.image[..., 0] > 130
     is_road = sloped.road > 127
     assert (is_bright == is_road)[inside].mean() > 0.99
-    is_building = sloped.building > 127
-    assert (is_building != is_road)[inside].mean() > 0.99
 
 
 def test_on_a_slope_what_was_not_in_the_image_is_not_known(labelled: LabelledImage) -> None:
@@ -78,7 +76,7 @@ def test_saturation_changes_colours_and_leaves_grey(labelled: LabelledImage) -> 
     assert np.array_equal(grey, _varied(labelled, STILL, 0).image)
 
     orange = np.full((*SIZE, 3), (180, 120, 60), np.uint8)
-    coloured = LabelledImage(orange, labelled.road, labelled.building, labelled.known)
+    coloured = LabelledImage(orange, labelled.road, labelled.known)
     spans = [np.ptp(_varied(coloured, how, seed).image[0, 0].astype(int)) for seed in SEEDS]
     assert min(spans) < 90
     assert max(spans) > 150
@@ -86,7 +84,7 @@ def test_saturation_changes_colours_and_leaves_grey(labelled: LabelledImage) -> 
 
 def test_a_grey_camera_shows_no_colour_and_the_same_brightness(labelled: LabelledImage) -> None:
     orange = np.full((*SIZE, 3), (180, 120, 60), np.uint8)
-    coloured = LabelledImage(orange, labelled.road, labelled.building, labelled.known)
+    coloured = LabelledImage(orange, labelled.road, labelled.known)
     varied = _varied(coloured, Augmentation(**{**vars(STILL), "grey_share": 1.0}), 0)
 
     assert (varied.image == 120).all()
@@ -95,7 +93,7 @@ def test_a_grey_camera_shows_no_colour_and_the_same_brightness(labelled: Labelle
 def test_a_stretched_street_is_wider_or_narrower_than_it_was(labelled: LabelledImage) -> None:
     road = np.zeros(SIZE, np.uint8)
     road[60:120, 90:150] = 255
-    square = LabelledImage(labelled.image, road, labelled.building, labelled.known)
+    square = LabelledImage(labelled.image, road, labelled.known)
 
     shapes = []
     for seed in SEEDS:
@@ -106,3 +104,16 @@ def test_a_stretched_street_is_wider_or_narrower_than_it_was(labelled: LabelledI
 
     assert min(shapes) < 0.75
     assert max(shapes) > 1.33
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_classes_move_with_the_image_and_are_unknown_outside(
+    labelled: LabelledImage, seed: int
+) -> None:
+    how = Augmentation(**{**vars(STILL), "slope": 0.2, "zoom": (0.7, 0.8)})
+    label = np.where(labelled.road > 0, 3, 1).astype(np.uint8)
+    image, classes = augmented_classes(labelled.image, label, 11, how, np.random.default_rng(seed))
+
+    assert set(np.unique(classes).tolist()) == {1, 3, 11}
+    inside = classes != 11
+    assert ((image[..., 0] > 130) == (classes == 3))[inside].mean() > 0.98

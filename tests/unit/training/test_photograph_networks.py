@@ -43,6 +43,17 @@ def difference(image):
 
 print(json.dumps({"darker": difference(shares * 0.5), "mirrored": difference(shares.flip(3))}))
 """
+ODDS = """
+import json
+import torch
+from cogmap.training.networks.photograph import log_odds
+
+torch.manual_seed(1)
+classes = torch.randn(2, 11, 4, 6)
+share = torch.softmax(classes, 1)[:, 3:4]
+difference = (torch.sigmoid(log_odds(classes, 3)) - share).abs().max()
+print(json.dumps({"difference": float(difference)}))
+"""
 HALVED = """
 import json
 import sys
@@ -89,6 +100,10 @@ def test_a_darker_view_has_the_same_features() -> None:
 
     assert changes["darker"] < 1e-3
     assert changes["mirrored"] > 0.1
+
+
+def test_odds_of_a_class_are_those_of_its_share_of_all_classes() -> None:
+    assert _printed(ODDS)["difference"] < 1e-6
 
 
 def test_a_network_in_half_precision_gives_what_it_gave_for_views_of_any_size(

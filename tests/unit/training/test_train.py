@@ -41,7 +41,7 @@ folder, out = map(Path, sys.argv[1:])
 shown = list(photographs(folder / "train", folder / "trainannot"))
 for name, seed in (("a", 3), ("b", 3), ("c", 4)):
     paths = out / f"{name}.onnx", out / f"{name}-segments.onnx"
-    train_on(shown, [], *paths, seed=seed, epochs=1, variations=2)
+    train_on(shown, [], *paths, seed=seed, epochs=2)
 """
 BATCHES = """
 import sys
@@ -59,6 +59,17 @@ found = list(prefetch(batches))
 assert (torch.random.get_rng_state() == before).all()
 assert [len(whole) for _, whole in found] == list(range(7))
 assert all((values == number).all() for number, (values, _) in enumerate(found))
+"""
+NUMBERED = """
+import numpy as np
+from cogmap.training.networks import loader
+
+def batch(number):
+    return (np.full((2, 3), number, np.float32),)
+
+for loader.MAX_WORKERS in (1, 3):
+    found = [int(values[0, 0]) for (values,) in loader.prefetch_numbered(batch, 7)]
+    assert found == list(range(7))
 """
 ROAD = 3
 OTHER = 0
@@ -117,6 +128,13 @@ def test_one_seed_gives_the_same_weights_and_another_seed_others(
 @needs_torch
 def test_prefetched_batches_come_in_order_without_using_torchs_random_state() -> None:
     done = _python("-c", BATCHES)
+
+    assert done.returncode == 0, done.stderr
+
+
+@needs_torch
+def test_numbered_batches_come_in_order_from_any_number_of_processes() -> None:
+    done = _python("-c", NUMBERED)
 
     assert done.returncode == 0, done.stderr
 
