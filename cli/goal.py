@@ -13,7 +13,7 @@ import click
 import msgspec
 
 from cogmap.cli.launch.goals import name_of, nearest_label, routeless
-from cogmap.cli.options import FiniteRange, agent_option, connect_option, json_option
+from cogmap.cli.options import agent_option, connect_option, json_option, wait_option
 from cogmap.errors import NoAnswerError, UsageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.client import Client
@@ -114,15 +114,7 @@ class Person:
 @click.option(
     "--clear", is_flag=True, help="Forget the goals that the agent has; without new ones it stops."
 )
-@click.option(
-    "--wait",
-    "timeout_s",
-    type=FiniteRange(0, 3600),
-    default=5.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="How long to wait for the plan.",
-)
+@wait_option
 @json_option
 @connect_option
 @agent_option

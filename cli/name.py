@@ -8,7 +8,7 @@ import threading
 import click
 import msgspec
 
-from cogmap.cli.options import FiniteRange, agent_option, connect_option, json_option
+from cogmap.cli.options import agent_option, connect_option, json_option, wait_option
 from cogmap.errors import NoAnswerError, UsageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.client import Client
@@ -57,15 +57,7 @@ class Namer:
 @click.command()
 @click.argument("which", required=False, metavar="[OBJECT]")
 @click.argument("given", required=False, metavar="[NAME]")
-@click.option(
-    "--wait",
-    "timeout_s",
-    type=FiniteRange(0, 3600),
-    default=5.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="How long to wait for the map.",
-)
+@wait_option
 @json_option
 @connect_option
 @agent_option

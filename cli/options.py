@@ -61,3 +61,12 @@ set_option = click.option(
     help="Override one setting; may be repeated.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+wait_option = click.option(
+    "--wait",
+    "timeout_s",
+    type=FiniteRange(0, 3600),
+    default=5.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="How long to wait for the agent.",
+)

@@ -115,7 +115,10 @@ class Individuals:
         looks = [look_of(percept, self.known) for percept in seen]
         candidates, possible = self._possible(seen, looks, agent, belief)
         found = associate(possible, belief)
-        is_here = _is_here(possible, looks, belief, percepts.stamp_ns, agent)
+        is_known = found.objects != NONE
+        is_here = bool(is_known.all()) or _is_here(
+            possible, looks, belief, percepts.stamp_ns, agent
+        )
 
         taken = {candidates[number].label for number in found.objects.tolist() if number != NONE}
         taken |= {percept.label for percept in identified}
