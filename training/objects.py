@@ -31,7 +31,7 @@ from cogmap.training.calibration import calibrate
 from cogmap.training.crops import Crops, crops
 from cogmap.training.networks.export import export
 from cogmap.training.networks.loader import Batch, prefetch, shuffled
-from cogmap.training.networks.optimizer import Optimizer, seed_torch
+from cogmap.training.networks.optimizer import Optimizer, mixed_precision, seed_torch
 from cogmap.training.networks.unet import convolution
 from cogmap.training.rendering.reader import INVENTED, files, read
 
@@ -211,7 +211,7 @@ def _fit(known: Crops, rng: np.random.Generator, epochs: int, progress: Progress
 
     for values, wanted, whole in prefetch(batches):
         batch = values.contiguous(memory_format=torch.channels_last)
-        with torch.autocast("cpu", torch.bfloat16):
+        with mixed_precision():
             embedding, log_odds = net(batch)
 
         unit = functional.normalize(directions)

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -30,19 +31,30 @@ from cogmap.services.epam.recognition.segments import (
     padded,
 )
 from cogmap.training.crops import MIN_OVERLAP, overlap
-from cogmap.training.networks.export import export
+from cogmap.training.networks.export import adopt, export
 from cogmap.training.networks.loader import prefetch, shuffled
-from cogmap.training.networks.optimizer import Optimizer, seed_torch
+from cogmap.training.networks.optimizer import Optimizer, mixed_precision, seed_torch
 from cogmap.training.networks.unet import UNet
 from cogmap.training.rendering.reader import Town, files, read, towns
 
 WIDTHS = (16, 48, 96, 160)
 BATCH = 16
-EPOCHS = 16
-MAX_RATE = 3e-3
 WEIGHT_DECAY = 1e-4
 MIN_AREA_PX = 10
 LARGE_SHARE = 0.01
+MIXED_SHARE = 0.15
+
+
+class Schedule(NamedTuple):
+    """How often every example is used, and the largest rate of learning."""
+
+    epochs: int
+    max_rate: float
+
+
+ANEW = Schedule(16, 3e-3)
+# The layers of a network that is trained further are no longer normalized, which large steps need.
+FURTHER = Schedule(8, 5e-4)
 
 
 class SegmentationNet(nn.Module):
@@ -172,43 +184,59 @@ def augmented(
 
 
 def train_on_renderings(
-    folder: Path, out: Path, *, seed: int, epochs: int | None = None
+    folder: Path, out: Path, *, seed: int, epochs: int | None = None, start: Path | None = None
 ) -> dict[str, float]:
-    """Train on the towns in `folder`/train, write the network to `out`, and return its `metrics`.
+    """Train on the towns in `folder`/train and `folder`/blocks, from the weights in `start` on if
+    there are any, write the network to `out`, and return its `metrics`.
 
-    Raises UsageError if there are no renderings.
+    Raises UsageError if there are no renderings, or `start` has other layers; ConfigError
+    if it holds no network that separates objects.
     """
     seed_torch(seed)
     rng = np.random.default_rng(seed)
+    net = SegmentationNet()
+    schedule = ANEW
+    if start is not None:
+        load(start)
+        adopt(net.eval(), start)
+        schedule = FURTHER
+    if epochs is not None:
+        schedule = schedule._replace(epochs=epochs)
 
     with Progress() as progress:
-        paths = progress.track(files(folder, "train"), description="reading")
+        found = [*files(folder, "train"), *files(folder, "blocks")]
+        paths = progress.track(found, description="reading")
         known = examples(read(path) for path in paths)
-        net = _fit(known, rng, epochs or EPOCHS, progress)
+        net.to(memory_format=torch.channels_last)
+        _fit(net, known, rng, schedule, progress)
 
     export(net, out, "seen", INPUT_SHAPE, OUTPUT_SHAPES)
-    return metrics(folder, out)
+    of_blocks = {
+        f"blocks_{key}": value for key, value in metrics(folder, out, "blocks-val").items()
+    }
+    return metrics(folder, out, "val") | of_blocks
 
 
 def _fit(
-    known: Examples, rng: np.random.Generator, epochs: int, progress: Progress
-) -> SegmentationNet:
-    net = SegmentationNet().to(memory_format=torch.channels_last)
-    steps = max(1, epochs * len(known.label) // BATCH)
-    optimizer = Optimizer(net.parameters(), steps, MAX_RATE, WEIGHT_DECAY)
+    net: SegmentationNet,
+    known: Examples,
+    rng: np.random.Generator,
+    schedule: Schedule,
+    progress: Progress,
+) -> None:
+    steps = max(1, schedule.epochs * len(known.label) // BATCH)
+    optimizer = Optimizer(net.parameters(), steps, schedule.max_rate, WEIGHT_DECAY)
 
     task = progress.add_task("training", total=steps)
     batches = partial(_batches, known, steps, rng)
     for values, wanted in prefetch(batches):
         batch = values.contiguous(memory_format=torch.channels_last)
-        with torch.autocast("cpu", torch.bfloat16):
+        with mixed_precision():
             padded_output = net(batch)
 
         output = padded_output[:, :, PADDING_PX:-PADDING_PX].float()
         value = optimizer.step(loss(output, wanted))
         progress.update(task, advance=1, description=f"training, loss {value:.3f}")
-
-    return net
 
 
 def _batches(
@@ -225,13 +253,14 @@ def _batches(
         yield padded(np.stack(inputs)), np.stack(targets)
 
 
-def metrics(folder: Path, weights: Path) -> dict[str, float]:
-    """Return the recall of buildings that cover at least LARGE_SHARE of a view in `folder`/val, and
-    the precision of segments at least as large.
+def metrics(folder: Path, weights: Path, split: str) -> dict[str, float]:
+    """Return the recall of buildings that cover at least LARGE_SHARE of a view in a split of
+    `folder`, the precision of segments at least as large, and the share of all segments of which at
+    least MIXED_SHARE is another building.
     """
     segmenter = load(weights)
     count = _Count()
-    for town in towns(folder, "val"):
+    for town in towns(folder, split):
         for image, depth_m, label in zip(town.left, town.stereo_m, town.label, strict=True):
             segments = segmenter.segments(image, depth_m, town.calibration)
             count.add(segments, label)
@@ -239,19 +268,22 @@ def metrics(folder: Path, weights: Path) -> dict[str, float]:
     return {
         "recall": count.found / max(count.buildings, 1),
         "precision": count.correct / max(count.segments, 1),
+        "mixed": count.mixed / max(count.all, 1),
     }
 
 
 @dataclass
 class _Count:
-    """Of all views: the large buildings and how many of them were found, and the large segments and
-    how many of them are right.
+    """Of all views: the large buildings and how many of them were found, the large segments and how
+    many of them are right, and all segments, and how many show two buildings.
     """
 
     buildings: int = 0
     found: int = 0
     segments: int = 0
     correct: int = 0
+    all: int = 0
+    mixed: int = 0
 
     def add(self, segments: list[Segment], label: Bytes) -> None:
         """Add a view with that `label` (h, w), in which `segments` were found."""
@@ -263,6 +295,10 @@ class _Count:
         matched = set()
         for segment in segments:
             building, share = overlap(segment, label)
+            shown_px = np.bincount(label[segment.mask], minlength=3)[1:]
+            second_px = np.partition(shown_px, -2)[-2]
+            self.all += 1
+            self.mixed += int(second_px > MIXED_SHARE * segment.area_px)
             is_match = share >= MIN_OVERLAP
             is_large = segment.area_px >= min_area_px
             self.segments += is_large

@@ -39,7 +39,7 @@ LINK_KIND = "near"
 
 
 def typical_operations() -> list[Operation]:
-    """Return operations of the workspace: 50 nodes, 200 links and a cloud of samples, 31 KB."""
+    """Return operations of the workspace: 50 nodes, 200 links and a cloud of samples, 32 KB."""
     samples = np.random.default_rng(SEED).normal(size=(SAMPLES, 3))
     nodes: list[AnyNode] = [Self(id=SELF_ID, samples=Matrix.of(samples))]
     for number in range(1, NODES):

@@ -41,7 +41,7 @@ OPTIONS = (
 def measure(setting: Setting, *, number: int = DELTAS, pairs: int = PAIRS) -> Metrics:
     """Measure the rate of committed deltas against raw Zenoh puts, and what is lost in a minute.
 
-    A workspace commits deltas of 31 KB that three replicas receive, validate and apply; the peer
+    A workspace commits deltas of 32 KB that three replicas receive, validate and apply; the peer
     puts the same bytes through the same router to three subscribers. Then the whole system drives
     for 60 s, recorded. Takes about two minutes.
     """

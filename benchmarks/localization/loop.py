@@ -65,7 +65,6 @@ def sections(surveyed: bool, settings: Mapping[str, object]) -> Sections:
         "samples": SAMPLES,
         "kept_samples": 100,
         "landmark_samples": 1000,
-        "correlated_views": 1.0,
         "landmarks": "points",
         "landmark_jitter_m": 0.003,
         "speed_gain_sd": SPEED,

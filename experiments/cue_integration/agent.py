@@ -13,7 +13,7 @@ from cogmap.services import registry
 SECTIONS: dict[str, dict[str, Any]] = {
     "run": {"lockstep": True},
     "workspace": {"cell_m": 0.25},
-    "codelets": {"correlated_views": 1.0},
+    "codelets": {"landmarks": "points"},
 }
 WORKER = "codelets-1"
 CYCLES_A_TRIAL = 1000

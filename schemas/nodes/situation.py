@@ -109,8 +109,9 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     `offsets_m`: float16 (n, 2), the samples relative to their mean (`x_m`, `y_m`), which keeps them
     to a thousandth of their spread. `sightings` is the number of views that agree with the
     position, `misses` that of views in a row that do not. One that is `surveyed` was given, and
-    stays where it is. `last_seen_ns` and `created_ns` are times of views. `function` is what it is
-    used for, such as "shop", empty if that is unknown.
+    stays where it is. `last_seen_ns` and `created_ns` are times of views; `seen_from_m` is where
+    the agent stood in the last one, relative to the object. `function` is what it is used for, such
+    as "shop", empty if that is unknown.
     """
 
     label: Name
@@ -128,6 +129,7 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     sightings: Count = 0
     misses: Count = 0
     last_seen_ns: Stamp = NEVER_NS
+    seen_from_m: tuple[Finite, Finite] | None = None
     created_ns: Stamp = 0
     surveyed: bool = False
     offsets_m: Matrix | None = None
@@ -153,6 +155,15 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
             return mean
 
         return mean + self.offsets_m.numpy()
+
+    def covariance_m2(self) -> npt.NDArray[np.float64]:
+        """Return the covariance of its position, (2, 2): that of its samples, if it has some."""
+        if self.offsets_m is None:
+            return np.diag([self.x_sd_m**2, self.y_sd_m**2])
+
+        offsets_m = self.offsets_m.numpy().astype(np.float64)
+        covariance: npt.NDArray[np.float64] = offsets_m.T @ offsets_m / len(offsets_m)
+        return covariance
 
 
 class Map(GraphNode, kw_only=True, frozen=True, tag="map"):

@@ -40,15 +40,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         int,
         Meta(description="Samples of each landmark's position.", ge=10, le=10_000),
     ] = 200
-    correlated_views: Annotated[
-        float,
-        Meta(
-            description="Successive views of a landmark whose errors are alike, so that together "
-            "they count as one; 1 takes each for independent, as eq. 1 does.",
-            ge=1,
-            le=10_000,
-        ),
-    ] = 60.0
     largest_landmark_sd_m: Annotated[
         PositiveMetres,
         Meta(
@@ -123,9 +114,9 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     landmarks: Annotated[
         Literal["buildings", "points"],
         Meta(
-            description="What landmarks are for map correction. buildings: successive sightings "
-            "of one of their sides err alike, and each side errs by itself. points: "
-            "all sightings err independently."
+            description="What landmarks are. buildings: successive sightings of one of their "
+            "sides err alike, and each side errs by itself. points: all sightings err "
+            "independently, as eq. 1 takes them to."
         ),
     ] = "buildings"
     place_match_sd_m: Annotated[

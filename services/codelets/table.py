@@ -54,6 +54,7 @@ ROWS = (
     Row("attention.place_lost"),
     Row("attention.episode"),
     Row("individuals.merging"),
+    Row("individuals.parting"),
 )
 
 

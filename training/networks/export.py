@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from torch import nn
+from torch import Tensor, nn
+
+from cogmap.errors import UsageError
 
 OPSET = 13
 # Weights with more values than this are stored in half precision where a file is to be small.
@@ -38,6 +40,47 @@ def export(
         output_names=list(output_names),
         dynamic_axes={input_name: free} if any_size else None,
     )
+
+
+def adopt(net: nn.Module, path: Path) -> None:
+    """Give `net` the weights of the network of its kind that `export` wrote to `path`, to train it
+    further. Raises UsageError if that has other layers.
+
+    What normalized the layers is part of these weights, so that the normalization of `net` does
+    nothing from here on: it must stay in evaluation.
+    """
+    import onnx
+    from onnx import numpy_helper
+
+    graph = onnx.load(path).graph
+    values = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
+    stored = [
+        [torch.tensor(values[name]) for name in node.input[1:]]
+        for node in graph.node
+        if node.op_type == "Conv" and all(name in values for name in node.input[1:])
+    ]
+    layers = [each for each in net.modules() if isinstance(each, nn.Conv2d | nn.BatchNorm2d)]
+    convolutions = [each for each in layers if isinstance(each, nn.Conv2d)]
+    shapes = [each.weight.shape for each in convolutions]
+    if shapes != [weight.shape for weight, _ in stored]:
+        raise UsageError(f"{path} holds another network: start from one that was trained so")
+
+    # The bias of a convolution without one is that of the normalization after it.
+    biases: list[Tensor] = []
+    of_convolutions = iter(stored)
+    for layer in layers:
+        if isinstance(layer, nn.BatchNorm2d):
+            layer.running_mean = torch.zeros(layer.num_features)
+            layer.running_var = torch.ones(layer.num_features) - layer.eps
+            layer.bias.data = biases.pop()
+            continue
+
+        weight, bias = next(of_convolutions)
+        layer.weight.data = weight
+        if layer.bias is None:
+            biases.append(bias)
+        else:
+            layer.bias.data = bias
 
 
 def halve(path: Path) -> None:

@@ -30,6 +30,14 @@ def training_device() -> torch.device:
     return torch.device("cuda")
 
 
+def mixed_precision() -> torch.autocast:
+    """Return a context in which a network computes in bfloat16 where the processor can: one without
+    AVX-512 would take ten times as long as in single precision (measured on such a one).
+    """
+    is_fast = torch.backends.cpu.get_cpu_capability().startswith("AVX512")
+    return torch.autocast("cpu", torch.bfloat16, enabled=is_fast)
+
+
 class Optimizer:
     """AdamW (Loshchilov & Hutter 2019), whose learning rate rises to `max_rate` in the share
     `warm_up` of all steps and then falls (Smith & Topin 2019). Parameters in groups have one such

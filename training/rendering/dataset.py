@@ -2,10 +2,11 @@
 
 The simulator draws towns from seeds, each view in a light of its own and from another place, and
 labels what it knows; sensory memory adds the depth from stereo. Towns for training are in the
-folder train, and in unlabelled more of them, whose buildings have no taught label; towns to choose
-and calibrate by are in val, and towns for tests in test. No town and no invented kind of building
-is in two of them. Files that exist are kept, so that an interrupted command continues; the same
-command gives the same files.
+folder train, and in unlabelled more of them, whose buildings have no taught label; in blocks are
+larger ones, with long streets of invented buildings, of which far ones stand close together in a
+view. Towns to choose and calibrate by are in val and blocks-val, and towns for tests in test. No
+town and no invented kind of building is in two of them. Files that exist are kept, so that an
+interrupted command continues; the same command gives the same files.
 """
 
 from __future__ import annotations
@@ -26,13 +27,13 @@ from cogmap.robot import NEAREST_DEPTH_M
 from cogmap.schemas.sensing import Calibration
 from cogmap.services.sensory.disparity import DepthFromStereo
 from cogmap.services.sensory.rectify import rectification
-from cogmap.training.rendering.towns import Views, render_town
+from cogmap.training.rendering.towns import Views, render_blocks, render_town
 
 
 @dataclass(frozen=True)
 class Split:
     """`towns` towns with seeds from `first_seed` on, of which one after the other has each number
-    of invented kinds of building.
+    of invented kinds of building; those of blocks have no others.
     """
 
     name: str
@@ -40,11 +41,14 @@ class Split:
     towns: int
     views: int
     invented: tuple[int, ...] = (0, 14, 28)
+    is_blocks: bool = False
 
 
 SPLITS = (
     Split("train", 1001, 84, 110),
     Split("unlabelled", 5001, 280, 45, (30,)),
+    Split("blocks", 6001, 36, 110, is_blocks=True),
+    Split("blocks-val", 6501, 3, 90, is_blocks=True),
     Split("val", 2001, 6, 90),
     Split("test", 3001, 6, 90),
 )
@@ -58,6 +62,7 @@ class Job:
     views: int
     invented: int
     target: Path
+    is_blocks: bool = False
 
 
 def jobs(out: Path, scale: float) -> Iterator[Job]:
@@ -69,6 +74,7 @@ def jobs(out: Path, scale: float) -> Iterator[Job]:
                 seed=seed,
                 views=split.views,
                 invented=split.invented[number % len(split.invented)],
+                is_blocks=split.is_blocks,
                 target=out / split.name / f"town-{seed}.npz",
             )
 
@@ -80,7 +86,11 @@ def render(job: Job) -> None:
 
     job.target.parent.mkdir(parents=True, exist_ok=True)
     try:
-        views = with_stereo_depth(render_town(job.seed, job.views, job.invented))
+        if job.is_blocks:
+            views = render_blocks(job.seed, job.views)
+        else:
+            views = render_town(job.seed, job.views, job.invented)
+        views = with_stereo_depth(views)
     except Exception as error:
         raise CogmapError(f"cannot render the town of seed {job.seed}: {error}") from error
 

@@ -21,7 +21,10 @@ from cogmap.geometry.arrays import Bytes
 from cogmap.robot import calibration
 from cogmap.schemas.sensing import Pose
 from cogmap.services.sim.layout import plan, town
+from cogmap.services.sim.layout.blocks import town as blocks
+from cogmap.services.sim.layout.blocks.strangers import of_strangers
 from cogmap.services.sim.layout.catalogue import CATALOGUE, BuildingType, invented
+from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.rendering.camera import Exposure, StereoCamera
 from cogmap.services.sim.rendering.light import some_light
 from cogmap.services.sim.world import World
@@ -48,7 +51,7 @@ def kinds(seed: int, invented_count: int) -> tuple[BuildingType, ...]:
     return (*invented(seed, invented_count), *known)
 
 
-def viewpoints(place: town.Town, count: int, rng: np.random.Generator) -> Iterator[Pose]:
+def viewpoints(place: Place, count: int, rng: np.random.Generator) -> Iterator[Pose]:
     """Yield `count` poses in `place`: every second one on a street, about along it, the others
     anywhere free, about towards a building.
     """
@@ -73,7 +76,7 @@ def viewpoints(place: town.Town, count: int, rng: np.random.Generator) -> Iterat
         yield Pose(x_m=x_m, y_m=y_m, heading_rad=math.remainder(heading_rad, math.tau))
 
 
-def is_free(place: town.Town, x_m: float, y_m: float) -> bool:
+def is_free(place: Place, x_m: float, y_m: float) -> bool:
     """Return true if the robot can stand there, away from buildings and outside of props."""
     here = (x_m, y_m, x_m, y_m)
     return not any(
@@ -82,14 +85,25 @@ def is_free(place: town.Town, x_m: float, y_m: float) -> bool:
 
 
 def render_town(seed: int, count: int, invented_count: int = 0) -> Views:
-    """Return `count` labelled views of the town of `seed`, with this number of invented kinds of
-    building.
+    """Return `count` labelled views of the small town of `seed`, with this number of invented kinds
+    of building.
     """
-    place = town.generate(seed, kinds(seed, invented_count))
+    return render(town.generate(seed, kinds(seed, invented_count)), count)
+
+
+def render_blocks(seed: int, count: int) -> Views:
+    """Return `count` labelled views of the town of blocks of `seed`, whose buildings are
+    invented.
+    """
+    return render(of_strangers(blocks.generate(seed)), count)
+
+
+def render(place: Place, count: int) -> Views:
+    """Return `count` labelled views of a town."""
     world = World(place)
     try:
         camera = StereoCamera(world, calibration())
-        rng = np.random.default_rng([seed, 0xEE])
+        rng = np.random.default_rng([place.seed, 0xEE])
         views = [labelled(world, camera, pose, rng) for pose in viewpoints(place, count, rng)]
     finally:
         world.close()

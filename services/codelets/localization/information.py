@@ -3,6 +3,9 @@
 A landmark was placed from where the agent took itself to be, and shares the error of that. It can
 correct only the error that came since; taken for independent, it would pull the agent after its own
 mistakes. (In a filter of the joint state their correlation does this.)
+
+Neither is a view new that is from where the view before was: it errs as that did, since it shows
+the same walls, as far away.
 """
 
 from __future__ import annotations
@@ -21,6 +24,18 @@ from cogmap.services.codelets.localization.measurement_model import Measurements
 from cogmap.services.codelets.localization.sampling import centred
 
 VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
+INDEPENDENT_RAD = 0.35
+"""Change of viewpoint, way over distance, after which a view of a building errs independently: of
+11,000 percepts in three towns of buildings never taught, errors of the same building correlate by
+0.45 at first, and by 0.21 then."""
+
+AROUND_RAD = 2 * math.pi
+"""Change of viewpoint after which a building informs the agent anew: it stands where all that was
+seen of it says, so that its own error is the same from all round."""
+
+MIN_DISTANCE_M = 0.1
+"""Nothing is seen from nearer; a change of viewpoint stays defined."""
+
 STAMP_FORMAT = struct.Struct("<d")
 STAMP_OFFSET = PathColumn.STAMP_S * STAMP_FORMAT.size
 
@@ -38,6 +53,20 @@ def new_share(samples: Floats, seen: Measurements, since: Floats) -> Floats:
     by_turns_m2 = since_rad2 * seen.range_m**2
     share: Floats = (2 * since_m2 + by_turns_m2) / position_m2
     return share.clip(0.0, 1.0)
+
+
+def new_view_share(landmark: Object, agent_m: Floats, independent_rad: float) -> float:
+    """Compute the share, 0 to 1, of a view of a landmark from (2,) that the last view of it has not
+    told: the way between both over the distance, of `independent_rad`, after which they err
+    independently.
+    """
+    if landmark.seen_from_m is None:
+        return 1.0
+
+    from_m = agent_m - (landmark.x_m, landmark.y_m)
+    way_m = math.dist(from_m, landmark.seen_from_m)
+    distance_m = max(math.hypot(*from_m), MIN_DISTANCE_M)
+    return min(1.0, way_m / distance_m / independent_rad)
 
 
 def variances_when_placed(graph: Graph, seen: Measurements) -> Floats:

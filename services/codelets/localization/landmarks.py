@@ -30,6 +30,7 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.localization.information import INDEPENDENT_RAD, new_view_share
 from cogmap.services.codelets.localization.measurement_model import (
     FARTHEST_M,
     GATE,
@@ -53,6 +54,8 @@ LOCAL_SHARE = 0.5
 DOUBTED = 2.0
 # Noise of the range places no landmark nearer, or behind the agent.
 MIN_RANGE_M = 0.1
+# A view of which less is new is as good as none; weights stay finite.
+MIN_SHARE = 1e-6
 # Successive misfits after which a landmark is placed anew.
 MISSES = 8
 # Names that an object may have, beside others that are less likely.
@@ -118,6 +121,11 @@ def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config:
     if landmark.surveyed or agent.misfits.is_lost or is_same_view:
         return landmark
 
+    agent_m = np.array([agent.x_m, agent.y_m])
+    share = 1.0
+    if config.landmarks == "buildings":
+        share = new_view_share(landmark, agent_m, INDEPENDENT_RAD)
+
     rng = generator(f"{task.task_id}/{percept.label}")
     before = landmark.positions_m()
     selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
@@ -125,10 +133,10 @@ def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config:
     mahalanobis2 = _mahalanobis2(before, selves, percept)
     if mahalanobis2.min() < GATE**2 and is_well_placed(landmark, percept):
         fitting = msgspec.structs.replace(landmark, sightings=landmark.sightings + 1, misses=0)
-        return with_positions(fitting, moved_towards(before, selves, percept, config))
+        return with_positions(fitting, moved_towards(before, selves, percept, share, config))
 
     if mahalanobis2.min() < GATE**2:
-        log_likelihood = -mahalanobis2 / 2 / config.correlated_views
+        log_likelihood = -mahalanobis2 / 2 * share
         kept = before[rejection_mask(log_likelihood, rng)]
         # Of a ring or a ray, the next view must find some between the samples that are kept.
         gaps_m = GAP * spread(kept, kept.mean(axis=0)) / len(kept)
@@ -156,12 +164,14 @@ def is_well_placed(landmark: Object, percept: Percept) -> bool:
     return math.hypot(landmark.x_sd_m, landmark.y_sd_m) < MAX_SD_SHARE * percept.range_m
 
 
-def moved_towards(positions_m: Floats, selves: Floats, percept: Percept, config: Config) -> Floats:
+def moved_towards(
+    positions_m: Floats, selves: Floats, percept: Percept, share: float, config: Config
+) -> Floats:
     """Move (n, 2) samples of a landmark's position towards where it is seen from (n, 7) samples of
     the self, and draw them together, as an ensemble Kalman filter does (Evensen 1994).
 
     Rejection keeps the best of the samples that there are: if the first sighting was from afar, all
-    of them may be wrong by as much. A view counts as one of `correlated_views`, and the less, the
+    of them may be wrong by as much. A view counts by its new `share`, and the less, the
     worse it fits: it may be of another landmark, or of a part of this one.
     """
     mean_m = positions_m.mean(axis=0)
@@ -183,7 +193,7 @@ def moved_towards(positions_m: Floats, selves: Floats, percept: Percept, config:
     innovation_m = seen_m - mean_m
     squared = innovation_m @ np.linalg.solve(covariance + noise, innovation_m)
     doubt = 1 + float(squared) / DOUBTED**2
-    gain = covariance @ np.linalg.inv(covariance + config.correlated_views * doubt * noise)
+    gain = covariance @ np.linalg.inv(covariance + doubt / max(share, MIN_SHARE) * noise)
 
     moved_m = mean_m + gain @ innovation_m
     after = (np.eye(2) - gain) @ covariance
@@ -288,6 +298,11 @@ def refreshed(
         height_m=percept.height_m,
         last_seen_ns=task.stamp_ns,
     )
+    agent = graph.agent
+    if agent is not None:
+        from_m = (agent.x_m - node.x_m, agent.y_m - node.y_m)
+        node = msgspec.structs.replace(node, seen_from_m=from_m)
+
     place = nearest_place(node.x_m, node.y_m, graph.cell_m(node.map), node.map)
     return [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
 

@@ -37,7 +37,9 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.localization.information import (
+    AROUND_RAD,
     new_share,
+    new_view_share,
     variances_when_placed,
 )
 from cogmap.services.codelets.localization.measurement_model import (
@@ -63,6 +65,7 @@ from cogmap.services.codelets.localization.sampling import (
     resample,
     tempering_exponent,
 )
+from cogmap.services.codelets.nodes import nodes_of
 
 # Three stages reach a likelihood that keeps one sample in 64 of those that would be kept at once.
 STAGES = 3
@@ -119,7 +122,11 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     seen = measurements(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
     if seen is not None:
         since = variances - variances_when_placed(graph, seen)
-        weights = new_share(moved, seen, since) / config.correlated_views
+        weights = new_share(moved, seen, since)
+        if config.landmarks == "buildings":
+            agent_m = moved[:, :2].mean(axis=0)
+            landmarks = nodes_of(graph, Object, map(object_id, seen.labels))
+            weights *= [new_view_share(each, agent_m, AROUND_RAD) for each in landmarks]
         found = correct(found, seen, weights, config, rng)
         away_m2 = agent.odometry.x_m**2 + agent.odometry.y_m**2
         path_m2 = float(variances[0]) + float(variances[1]) * away_m2

@@ -20,7 +20,6 @@ UNCALIBRATED: dict[str, Any] = {
     "samples": 1000,
     "kept_samples": 100,
     "landmark_samples": 1000,
-    "correlated_views": 1.0,
     "landmarks": "points",
     "landmark_jitter_m": 0.003,
     "speed_gain_sd": SPEED_SHARE,

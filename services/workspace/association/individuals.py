@@ -162,6 +162,7 @@ class Individuals:
             one = Possible(
                 percept=percept,
                 objects=nodes,
+                own_m2=[node.covariance_m2() for node in nodes],
                 numbers=np.array([number_of[node.label] for node in nodes], np.int64),
                 log_likeness=np.log(likenesses),
                 log_none=math.log((NEW_PER_VIEW + MISTAKES_PER_VIEW) * look.of_another),

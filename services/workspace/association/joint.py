@@ -56,13 +56,14 @@ class Belief(NamedTuple):
 
 
 class Possible(NamedTuple):
-    """A percept, the objects that it may be of, m of them, by number (m,), with the logarithm of
-    how much likelier it looks so if it is of each than of any, (m,), and that of how likely it is
-    of none of them.
+    """A percept, the objects that it may be of, m of them, with the covariances of where these
+    stand (m, 2, 2), by number (m,), with the logarithm of how much likelier it looks so if it is of
+    each than of any, (m,), and that of how likely it is of none of them.
     """
 
     percept: Percept
     objects: Sequence[Object]
+    own_m2: Sequence[Floats]
     numbers: Indices
     log_likeness: Floats
     log_none: float
@@ -90,10 +91,10 @@ def associate(percepts: Sequence[Possible], belief: Belief) -> Association:
         stays = belief._replace(log_weights=belief.log_weights + possible.log_none)
         parts = [stays]
         together = [np.column_stack([chosen, np.full(count, NONE)])]
-        for place, node in enumerate(possible.objects):
+        for place, (node, own_m2) in enumerate(zip(possible.objects, possible.own_m2, strict=True)):
             is_free = ~(chosen == possible.numbers[place]).any(axis=1)
             before = belief.take(np.flatnonzero(is_free))
-            after = seen(before, possible.percept, node)
+            after = seen(before, possible.percept, node, own_m2)
             log_weights = after.log_weights + possible.log_likeness[place]
             parts.append(after._replace(log_weights=log_weights))
             added = np.full(len(before.means), possible.numbers[place])
@@ -122,16 +123,14 @@ def associate(percepts: Sequence[Possible], belief: Belief) -> Association:
     return Association(objects, probability, log_evidence)
 
 
-def seen(belief: Belief, percept: Percept, node: Object) -> Belief:
-    """Return the belief once a percept is taken to be of an object. Its weights are multiplied by
-    how much likelier the percept is then seen where it is than anything anywhere in view.
-
-    An object's own uncertainty counts along and across the line of sight.
+def seen(belief: Belief, percept: Percept, node: Object, own_m2: Floats) -> Belief:
+    """Return the belief once a percept is taken to be of an object, which stands where it does with
+    the covariance `own_m2`, (2, 2). Its weights are multiplied by how much likelier the percept is
+    then seen where it is than anything anywhere in view.
     """
     offset_m = np.array([node.x_m, node.y_m]) - belief.means[:, :2]
     distance_m = np.hypot(offset_m[:, 0], offset_m[:, 1]).clip(MIN_DISTANCE_M)
     towards = offset_m / distance_m[:, None]
-    own_m2 = (node.x_sd_m**2 + node.y_sd_m**2) / 2
 
     # Range and bearing, and how they change with the pose.
     direction_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0])
@@ -144,12 +143,9 @@ def seen(belief: Belief, percept: Percept, node: Object) -> Belief:
     change[:, 1, 0] = towards[:, 1] / distance_m
     change[:, 1, 1] = -towards[:, 0] / distance_m
     change[:, 1, 2] = -1.0
-    noise = np.column_stack(
-        [
-            np.full(len(offset_m), percept.range_sd_m**2 + own_m2),
-            percept.bearing_sd_rad**2 + own_m2 / distance_m**2,
-        ]
-    )
+    # What is uncertain of the object's place changes both as the pose does, the other way.
+    noise = change[:, :, :2] @ own_m2 @ change[:, :, :2].mT
+    noise += np.diag([percept.range_sd_m**2, percept.bearing_sd_rad**2])
 
     is_known: Booleans = np.array([percept.has_range, percept.has_bearing])
     if not is_known.any():
@@ -158,7 +154,7 @@ def seen(belief: Belief, percept: Percept, node: Object) -> Belief:
     dimensions = int(is_known.sum())
     innovation = innovation[:, is_known]
     change = change[:, is_known]
-    noises = noise[:, is_known, None] * np.eye(dimensions)
+    noises = noise[:, is_known][:, :, is_known]
 
     spread = change @ belief.covariances @ change.mT + noises
     inverse = np.linalg.inv(spread)

@@ -14,7 +14,7 @@ from cogmap.services.codelets.config import Config
 from cogmap.testing import graph_of, landmark, task
 from tests.support.world.scenes import run
 
-EXACT = Config(samples=4000, kept_samples=2000, correlated_views=1.0)
+EXACT = Config(samples=4000, kept_samples=2000, landmarks="points")
 Row = tuple[float, float, float, float, float]
 
 

@@ -148,6 +148,7 @@ def _every_task() -> list[Task]:
         task("place_lost"),
         task("episode"),
         task("merging", about=["object:house", "object:home"]),
+        task("parting", about=["object:house"]),
     ]
 
 

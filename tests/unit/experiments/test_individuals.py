@@ -8,12 +8,11 @@ import pytest
 
 from cogmap.experiments.individuals.places import (
     BETWEEN,
-    GATES,
-    GATES_WIDTH_M,
     equal_houses,
     never_taught,
 )
 from cogmap.services.sim.layout.blocks import town as blocks
+from cogmap.services.sim.layout.blocks.strangers import GATES, GATES_WIDTH_M
 from cogmap.services.sim.layout.catalogue import CATALOGUE
 
 TAUGHT = {kind.name for kind in CATALOGUE}

@@ -43,6 +43,24 @@ for name, seed in (("a", 3), ("b", 3), ("c", 4)):
     paths = out / f"{name}.onnx", out / f"{name}-segments.onnx"
     train_on(shown, [], *paths, seed=seed, epochs=2)
 """
+FURTHER = """
+import sys
+from pathlib import Path
+import numpy as np
+import torch
+from cogmap.services.epam.network import Network
+from cogmap.services.epam.recognition.segments import DEFAULT_PATH, INPUT_SHAPE, OUTPUT_SHAPES
+from cogmap.training.networks.export import adopt
+from cogmap.training.segments import SegmentationNet
+
+net = SegmentationNet().eval()
+adopt(net, DEFAULT_PATH)
+view = np.random.default_rng(1).normal(size=INPUT_SHAPE).astype(np.float32)
+with torch.no_grad():
+    found = net(torch.from_numpy(view)).numpy()
+(wanted,) = Network(DEFAULT_PATH, INPUT_SHAPE, OUTPUT_SHAPES, "cpu")(view)
+print(float(np.abs(found - wanted).max() / np.abs(wanted).max()))
+"""
 BATCHES = """
 import sys
 import numpy as np
@@ -176,9 +194,15 @@ def test_segments_and_objects_are_learned_from_renderings_the_same_each_time(
     tmp_path: Path,
 ) -> None:
     wanted = []
-    for split, seed, invented in (("train", 4007, 0), ("unlabelled", 4008, 30), ("val", 4009, 20)):
+    for split, seed, invented in (
+        ("train", 4007, 0),
+        ("unlabelled", 4008, 30),
+        ("val", 4009, 20),
+        ("blocks", 4010, 0),
+        ("blocks-val", 4011, 0),
+    ):
         target = tmp_path / split / f"town-{seed}.npz"
-        wanted.append(Job(seed, 8, invented, target))
+        wanted.append(Job(seed, 8, invented, target, is_blocks=split.startswith("blocks")))
     render_all(wanted, processes=2)
 
     first = tmp_path / "a"
@@ -206,6 +230,24 @@ def _trained(name: str, folder: Path, out: Path) -> str:
     done = _python("-m", "training", name, str(folder), *options)
     assert done.returncode == 0, done.stderr
     return done.stdout.replace(weights, "")
+
+
+@needs_torch
+def test_a_network_that_is_trained_further_begins_with_what_it_had_learned() -> None:
+    done = _python("-c", FURTHER)
+
+    assert done.returncode == 0, done.stderr
+    assert float(done.stdout) < 1e-4
+
+
+@needs_torch
+def test_only_a_network_of_its_kind_is_trained_further(tmp_path: Path) -> None:
+    start = ("--start", str(objects.DEFAULT_PATH), "--out", str(tmp_path / "a.onnx"))
+    done = _python("-m", "training", "segments", str(tmp_path), *start)
+
+    assert done.returncode == 2
+    assert "objects.onnx" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 @needs_torch

@@ -4,27 +4,37 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
 from cogmap.schemas.nodes import Object
 from cogmap.services.codelets.config import Config
+from cogmap.services.codelets.localization.information import INDEPENDENT_RAD, new_view_share
 from cogmap.services.codelets.localization.landmarks import MISSES
 from cogmap.testing import agent, graph_of, landmark, percept, task
 from tests.support.world.landmarks import house
 from tests.support.world.scenes import run
 
-CONFIG = Config(correlated_views=1.0)
+CONFIG = Config(landmarks="points")
 ASIDE_RAD = math.pi / 2
 
 
 def _seen(
-    known: Object, bearing_rad: float, range_m: float, number: int = 0, config: Config = CONFIG
+    known: Object,
+    bearing_rad: float,
+    range_m: float,
+    number: int = 0,
+    config: Config = CONFIG,
+    *,
+    pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> Object:
-    """The landmark after it was seen from the origin."""
+    """The landmark after it was seen from there."""
+    facts = dict(zip(("x_m", "y_m", "heading_rad"), pose, strict=True))
+    here = agent(np.tile(pose, (200, 1)), **facts)
     seen = percept("house", bearing_rad, range_m, bearing_sd_rad=0.02, range_sd_m=0.4)
     asked = task("landmark", identifier=f"{number}/landmark", percepts=[seen])
-    found, _ = run(asked, graph_of(agent(), known), config).operations
+    found, _ = run(asked, graph_of(here, known), config).operations
     assert isinstance(found, Object)
     return found
 
@@ -45,7 +55,7 @@ def test_seeing_a_landmark_again_shrinks_its_spread_around_where_it_is() -> None
 def test_a_landmarks_samples_become_the_exact_gaussian_posterior_of_eq_4() -> None:
     samples_m = np.random.default_rng(6).normal((10.0, 0.0), (1.0, 0.01), (8000, 2))
     known = landmark("house", samples_m)
-    config = Config(landmark_jitter_m=1e-6, correlated_views=1.0)
+    config = Config(landmark_jitter_m=1e-6, landmarks="points")
     found = _seen(known, 0.0, 11.0, config=config)
 
     prior = 1 / 1.0**2
@@ -101,3 +111,27 @@ def test_a_landmark_first_seen_from_afar_and_wrongly_comes_to_where_it_is_seen_f
         known = _seen(known, 0.0, 19.0, number)
 
     assert known.x_m == pytest.approx(19.0, abs=0.5)
+
+
+def test_a_building_is_known_no_better_by_the_same_view_again_but_by_one_from_aside() -> None:
+    config = Config(landmarks="buildings")
+    known = _seen(house(10.0, 0.0, 1.0, sightings=1), 0.0, 10.0, config=config)
+    again = known
+    for number in range(1, 20):
+        again = _seen(again, 0.0, 10.0, number, config)
+    from_aside = _seen(again, 0.0, 10.0, 20, config, pose=(10.0, -10.0, ASIDE_RAD))
+
+    assert known.x_sd_m < 0.6
+    assert again.x_sd_m == pytest.approx(known.x_sd_m, rel=0.05)
+    assert from_aside.x_sd_m < 0.7 * again.x_sd_m
+
+
+def test_the_nearer_an_agent_drives_past_the_more_each_view_tells_of_a_building() -> None:
+    far = msgspec.structs.replace(house(50.0, 0.0, 1.0), seen_from_m=(-50.0, 0.0))
+    near = msgspec.structs.replace(house(5.0, 0.0, 1.0), seen_from_m=(-5.0, 0.0))
+    moved_m = np.array([0.0, 1.0])
+
+    assert new_view_share(near, moved_m, INDEPENDENT_RAD) == pytest.approx(
+        10 * new_view_share(far, moved_m, INDEPENDENT_RAD), rel=0.05
+    )
+    assert new_view_share(house(5.0, 0.0, 1.0), moved_m, INDEPENDENT_RAD) == 1.0

@@ -186,7 +186,7 @@ def test_a_turned_agent_recovers_its_heading_by_three_landmarks(
         landmarks.append(house(x_m, y_m, label=label))
         seen.append(percept(label, bearing_rad, range_m, bearing_sd_rad=0.03, range_sd_m=0.15))
 
-    config = Config(samples=800, correlated_views=1.0)
+    config = Config(samples=800, landmarks="points")
     found = localized(agent(samples), *landmarks, config=config, percepts=seen)
 
     error_rad = math.remainder(found.heading_rad - heading_rad, math.tau)

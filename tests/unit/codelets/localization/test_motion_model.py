@@ -23,7 +23,7 @@ from tests.support.world.scenes import run
 PLACES = {"mill": (20.0, 0.0), "tower": (0.0, 25.0), "church": (-15.0, -10.0), "inn": (30.0, 30.0)}
 Pose = tuple[float, float, float]
 UNKNOWN_BEARING = {"bearing_sd_rad": 2 * math.pi}
-CONFIG = Config(correlated_views=1.0)
+CONFIG = Config(landmarks="points")
 A_METRE = np.array([[1.0, 0.0, 1.0, 0.1, 0.0]])
 TWO = ("mill", "tower")
 THREE = ("mill", "tower", "church")
@@ -238,7 +238,7 @@ def test_bearings_alone_to_three_landmarks_give_the_position() -> None:
 def test_range_or_bearing_alone_places_a_new_landmark_from_several_places(
     alone: dict[str, float],
 ) -> None:
-    config = Config(correlated_views=1.0, landmark_samples=4000)
+    config = Config(landmarks="points", landmark_samples=4000)
     places_m = ((0.0, 0.0), (4.0, 3.0), (8.0, 2.0), (12.0, 6.0), (8.0, 9.0), (4.0, 12.0))
 
     known: list[Object] = []
@@ -261,7 +261,7 @@ def test_landmarks_calibrate_wheels_that_always_slip() -> None:
     def off_m(speed_gain_sd: float) -> float:
         config = Config(
             samples=1000,
-            correlated_views=1.0,
+            landmarks="points",
             speed_gain_sd=speed_gain_sd,
         )
         agent = _agent()
