@@ -322,3 +322,11 @@ def test_percepts_are_published_with_all_else_that_they_had() -> None:
     (entered,) = _entered([_house("41a", 20.0, 0.0)], seen)
 
     assert msgspec.structs.replace(entered, label="", certainty=1.0) == seen
+
+
+def test_an_object_that_is_unsure_along_the_line_of_sight_may_stand_farther_but_not_aside() -> None:
+    samples_m = np.random.default_rng(1).normal((30.0, 0.0), (4.0, 0.3), (200, 2))
+    known = [landmark("41a", samples_m, names={}, sightings=9, width_m=8.0)]
+
+    assert _labels(known, _sight("", 35.0, 0.0)) == ["41a"]
+    assert _labels(known, _sight("", 30.0, 6.0)) != ["41a"]
