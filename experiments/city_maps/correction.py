@@ -18,7 +18,7 @@ def settings(method: str, step_m: float) -> Sections:
         "path_spacing_m": step_m / 2,
         "place_match_sd_m": PLACE_SD_M,
         "place_match_sd_rad": PLACE_SD_RAD,
-        "landmarks": "points",
+        "landmarks": "buildings",
         # The whole path is evaluated.
         "sparse_after_s": NEVER_S,
     }

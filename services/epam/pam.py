@@ -15,7 +15,7 @@ from cogmap.schemas.sensing import Calibration, Percept
 from cogmap.services.epam.association.prior import NOTHING_EXPECTED, Prior
 from cogmap.services.epam.association.relations import NamedObject, beside
 from cogmap.services.epam.config import Config
-from cogmap.services.epam.layout.footprint_fit import Silhouette, locate
+from cogmap.services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
 from cogmap.services.epam.layout.ground import project
 from cogmap.services.epam.layout.road import RoadSegmenter
 from cogmap.services.epam.recognition.candidate import (
@@ -47,10 +47,14 @@ USUAL_SIDES_SD_M = (2.4, 1.6)
 KNOWN_SD_M = 0.02
 # Beside the fit's own: the shape is not known to be a rectangle, nor an end to be the object's.
 UNKNOWN_SHAPE_SD_M = 0.7
-# A footprint's fit with a larger misfit, in standard deviations, or a larger standard deviation of
-# its range, as a share of the range, is rejected: the object is placed as one of the usual size.
+# A footprint whose sides were taught and that fits worse, in standard deviations, is of another
+# building: one of the usual size.
 MAX_MISFIT = 2.0
-MAX_RANGE_SD_SHARE = 0.15
+# A fit that knows the place no better than this share of the range says less than the walls do.
+MAX_SD_SHARE = 0.5
+# What no footprint fits is placed so many times worse than what has its ends hidden (270 views of
+# three towns of blocks: half of those were beyond two standard deviations, as if they were not).
+UNFITTED_WIDER = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,36 +175,10 @@ class ExtendedPam:
         return replace(candidate, recognition=recognition)
 
     def _percepts(self, found: list[Candidate], camera: Calibration) -> list[Percept]:
-        """Place each percept by its known footprint if that fits what is seen, else as a building
-        of the usual size.
-        """
-        # Those of which at least one true end is seen.
-        silhouettes: list[Silhouette | None] = []
-        for candidate in found:
-            seen = candidate.walls
-            size_m = candidate.recognition.size_m
-            if not (seen.left_true or seen.right_true):
-                silhouettes.append(None)
-            elif size_m is not None:
-                silhouettes.append(seen.silhouette(size_m[:2], (KNOWN_SD_M, KNOWN_SD_M)))
-            else:
-                silhouettes.append(seen.silhouette(USUAL_SIDES_M, USUAL_SIDES_SD_M))
-        located = iter(locate([each for each in silhouettes if each is not None], camera))
-
+        """Return the percept of each candidate, where it stands."""
         percepts = []
-        for candidate, silhouette in zip(found, silhouettes, strict=True):
+        for candidate, pose in zip(found, _poses(found, camera), strict=True):
             recognition = candidate.recognition
-            pose = next(located) if silhouette is not None else None
-            if pose is not None and recognition.size_m is None:
-                pose = pose.blurred(UNKNOWN_SHAPE_SD_M)
-            if (
-                pose is None
-                or pose.range_m > MAX_RANGE_M
-                or pose.range_sd_m > MAX_RANGE_SD_SHARE * pose.range_m
-                or pose.misfit > MAX_MISFIT
-            ):
-                pose = candidate.walls.usual_pose(camera)
-
             top_m = height_m(candidate, camera)
             if recognition.size_m is not None:
                 _, _, top_m = recognition.size_m
@@ -233,6 +211,44 @@ class ExtendedPam:
             )
 
         return percepts
+
+
+def _poses(found: list[Candidate], camera: Calibration) -> list[ObjectPose]:
+    """Place each candidate by its known footprint if that fits what is seen, else by one of about
+    the usual size, and by its walls alone if no true end of it is seen.
+    """
+    poses: dict[int, ObjectPose] = {}
+    bounded = [
+        number
+        for number, candidate in enumerate(found)
+        if candidate.walls.left_true or candidate.walls.right_true
+    ]
+    taught: list[int] = []
+    silhouettes: list[Silhouette] = []
+    for number in bounded:
+        size_m = found[number].recognition.size_m
+        if size_m is not None:
+            sides_sd_m = (KNOWN_SD_M, KNOWN_SD_M)
+            silhouettes.append(found[number].walls.silhouette(size_m[:2], sides_sd_m))
+            taught.append(number)
+    for number, pose in zip(taught, locate(silhouettes, camera), strict=True):
+        if pose.misfit <= MAX_MISFIT:
+            poses[number] = pose
+
+    usual = [number for number in bounded if number not in poses]
+    silhouettes = [
+        found[number].walls.silhouette(USUAL_SIDES_M, USUAL_SIDES_SD_M) for number in usual
+    ]
+    for number, pose in zip(usual, locate(silhouettes, camera), strict=True):
+        fitted = pose.widened(max(1.0, pose.misfit)).blurred(UNKNOWN_SHAPE_SD_M)
+        if fitted.range_m > MAX_RANGE_M or fitted.sd_m > MAX_SD_SHARE * fitted.range_m:
+            fitted = found[number].walls.usual_pose(camera).widened(UNFITTED_WIDER)
+        poses[number] = fitted
+
+    return [
+        poses[number] if number in poses else candidate.walls.usual_pose(camera)
+        for number, candidate in enumerate(found)
+    ]
 
 
 def _is_piece(candidate: Candidate, whole: Candidate) -> bool:

@@ -24,10 +24,11 @@ from cogmap.services.codelets.localization.measurement_model import Measurements
 from cogmap.services.codelets.localization.sampling import centred
 
 VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
-INDEPENDENT_RAD = 0.35
+INDEPENDENT_RAD = 0.2
 """Change of viewpoint, way over distance, after which a view of a building errs independently: of
 11,000 percepts in three towns of buildings never taught, errors of the same building correlate by
-0.45 at first, and by 0.21 then."""
+0.45 from nearly the same viewpoint, and by 0.3 then. Objects err by 1.16 m there (1.20 with 0.35;
+1.3 with 0.7)."""
 
 AROUND_RAD = 2 * math.pi
 """Change of viewpoint after which a building informs the agent anew: it stands where all that was

@@ -78,6 +78,19 @@ class ObjectPose:
     misfit: float
     width_m: float
 
+    @property
+    def sd_m(self) -> float:
+        """Return the standard deviation of the place, along and across together."""
+        return math.hypot(self.range_sd_m, self.range_m * self.bearing_sd_rad)
+
+    def widened(self, factor: float) -> ObjectPose:
+        """Return the pose with errors that many times as large."""
+        return replace(
+            self,
+            bearing_sd_rad=factor * self.bearing_sd_rad,
+            range_sd_m=factor * self.range_sd_m,
+        )
+
     def blurred(self, sd_m: float) -> ObjectPose:
         """Return the pose with an error of that standard deviation more, in either direction."""
         across_sd_m = math.hypot(self.range_m * self.bearing_sd_rad, sd_m)
@@ -127,6 +140,13 @@ def locate(silhouettes: list[Silhouette], camera: Calibration) -> list[ObjectPos
     ]
 
 
+def bias_sd_px(width_px: Floats | int) -> Floats:
+    """Return the standard deviation of what the disparities of an object err by together, of that
+    many columns.
+    """
+    return np.asarray(DISPARITY_BIAS_SD_PX + NARROW_BIAS_PX / np.asarray(width_px))
+
+
 def _stacked(silhouettes: list[Silhouette], camera: Calibration) -> FootprintProblem:
     """Stack all silhouettes into one problem, at COLUMNS evenly spaced columns of each."""
     columns = np.empty((len(silhouettes), COLUMNS))
@@ -151,7 +171,7 @@ def _stacked(silhouettes: list[Silhouette], camera: Calibration) -> FootprintPro
         half_m=np.array(sides_m) / 2,
         half_sd_m=np.array([each.sides_sd_m for each in silhouettes]) / 2,
         sd_px=DISPARITY_SD_PX * np.sqrt(redundancy),
-        bias_sd_px=DISPARITY_BIAS_SD_PX + NARROW_BIAS_PX / width_px,
+        bias_sd_px=bias_sd_px(width_px),
         camera=camera,
     )
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cogmap.geometry.arrays import Floats, Singles
 from cogmap.schemas.sensing import Calibration
-from cogmap.services.epam.layout.footprint_fit import ObjectPose, Silhouette
+from cogmap.services.epam.layout.footprint_fit import ObjectPose, Silhouette, bias_sd_px
 from cogmap.services.epam.recognition.segments import Segment
 
 # A column with fewer known pixels has no disparity; a segment with fewer such columns has no walls.
@@ -92,7 +92,9 @@ class Walls:
     def usual_pose(self, camera: Calibration) -> ObjectPose:
         """Return the pose of a building of the usual size, behind the middle of these walls."""
         median_px = float(np.median(self.disparity_px))
-        depth_m = camera.fx_px * camera.baseline_m / max(median_px, MIN_DISPARITY_PX)
+        focal_baseline = camera.fx_px * camera.baseline_m
+        depth_m = focal_baseline / max(median_px, MIN_DISPARITY_PX)
+        depth_sd_m = depth_m**2 / focal_baseline * bias_sd_px(len(self.columns))
         slope = (camera.cx_px - self.middle) / camera.fx_px
         forward_m = depth_m + camera.mount_forward_m
         left_m = slope * depth_m
@@ -106,7 +108,7 @@ class Walls:
             bearing_rad=float(np.arctan2(left_m, forward_m)),
             range_m=range_m,
             bearing_sd_rad=float(lateral_sd_m / range_m),
-            range_sd_m=float(np.hypot(USUAL_SD_M, 0.05 * range_m)),
+            range_sd_m=float(np.hypot(USUAL_SD_M, depth_sd_m)),
             misfit=0.0,
             width_m=2 * USUAL_HALF_M,
         )

@@ -116,3 +116,12 @@ def test_several_objects_are_placed_as_each_alone_is() -> None:
 
     assert together == locate(outlines, CAMERA)
     assert locate([], CAMERA) == []
+
+
+def test_a_pose_that_is_widened_errs_by_so_many_times_more_and_stays_where_it_is() -> None:
+    place = _located(_seen(20.0, 0.0, 0.3))
+    wide = place.widened(3.0)
+
+    assert (wide.range_m, wide.bearing_rad) == (place.range_m, place.bearing_rad)
+    assert wide.range_sd_m == pytest.approx(3 * place.range_sd_m)
+    assert wide.bearing_sd_rad == pytest.approx(3 * place.bearing_sd_rad)

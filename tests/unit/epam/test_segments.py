@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -207,3 +208,10 @@ def test_a_building_of_unknown_size_is_placed_behind_its_visible_middle() -> Non
     assert place.range_sd_m > 1.0
     assert wall.width_m(CAMERA) == pytest.approx(60 / CAMERA.fx_px * wall_m, rel=0.01)
     assert math.isfinite(place.bearing_sd_rad)
+
+
+def test_a_building_whose_ends_are_hidden_is_the_less_surely_placed_the_farther_it_is() -> None:
+    near = _walls(130, 190).usual_pose(CAMERA)
+    far = replace(_walls(130, 190), disparity_px=np.full(60, WALL_PX / 4)).usual_pose(CAMERA)
+
+    assert far.range_sd_m > 1.5 * near.range_sd_m

@@ -129,7 +129,7 @@ def test_a_building_is_known_no_better_by_the_same_view_again_but_by_one_from_as
 def test_the_nearer_an_agent_drives_past_the_more_each_view_tells_of_a_building() -> None:
     far = msgspec.structs.replace(house(50.0, 0.0, 1.0), seen_from_m=(-50.0, 0.0))
     near = msgspec.structs.replace(house(5.0, 0.0, 1.0), seen_from_m=(-5.0, 0.0))
-    moved_m = np.array([0.0, 1.0])
+    moved_m = np.array([0.0, 0.5])
 
     assert new_view_share(near, moved_m, INDEPENDENT_RAD) == pytest.approx(
         10 * new_view_share(far, moved_m, INDEPENDENT_RAD), rel=0.05
