@@ -94,3 +94,12 @@ def test_a_later_view_is_from_elsewhere_and_shows_the_building() -> None:
         assert abs(turned_rad) >= math.radians(45) - 1e-9
         assert max(near_m, far_m) / min(near_m, far_m) >= 1.3
         assert 5 <= far_m <= 60
+
+
+def test_a_building_without_a_name_in_a_view_is_neither_met_nor_recognised() -> None:
+    met = [_meeting(0.0, 10.0, (0, "")), _meeting(0.0, 10.0, (0, "new-1"))]
+    later = [_meeting(2.0, 20.0, (0, "new-1"), (1, ""))]
+
+    memory = remembered(met, later, TRAINED)
+
+    assert (memory.met, memory.later, memory.right, memory.splits) == (1, 2, 1, 0)
