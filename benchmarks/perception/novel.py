@@ -21,9 +21,12 @@ MIN_MET_SHARE = 0.15
 
 MET_BEFORE = 0.8
 """A building that is well visible was met before if it looks so with this probability: it is seen
-so well that it would look so (chosen on twelve towns that are none of the benchmark's)."""
+so well that it would look so (chosen on three towns that are none of the benchmark's: 0.84 right
+and 0.04 wrong; with 0.9 it is 0.81 and 0.03)."""
 
 EVEN = 0.5
+"""From this probability on a building that is small or cut off is the one that it looks like."""
+
 SURE = 0.7
 """With less activation a building is not taken for known. LIDA: the threshold of percepts."""
 
