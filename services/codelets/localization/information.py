@@ -27,8 +27,8 @@ VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
 INDEPENDENT_RAD = 0.2
 """Change of viewpoint, way over distance, after which a view of a building errs independently: of
 11,000 percepts in three towns of buildings never taught, errors of the same building correlate by
-0.45 from nearly the same viewpoint, and by 0.3 then. Objects err by 1.16 m there (1.20 with 0.35;
-1.3 with 0.7)."""
+0.45 from nearly the same viewpoint, and by 0.3 then. In other drives through these towns objects
+err by 1.16 m with it, by 1.20 with 0.35."""
 
 AROUND_RAD = 2 * math.pi
 """Change of viewpoint after which a building informs the agent anew: it stands where all that was
