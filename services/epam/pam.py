@@ -52,8 +52,9 @@ UNKNOWN_SHAPE_SD_M = 0.7
 MAX_MISFIT = 2.0
 # A fit that knows the place no better than this share of the range says less than the walls do.
 MAX_SD_SHARE = 0.5
-# What no footprint fits is placed so many times worse than what has its ends hidden (270 views of
-# three towns of blocks: half of those were beyond two standard deviations, as if they were not).
+# What no footprint fits is placed so many times worse than what has its ends hidden (chosen on 270
+# views of three towns of blocks; of those whose fit was unsure, 44 % were beyond two standard
+# deviations before).
 UNFITTED_WIDER = 2.0
 
 
