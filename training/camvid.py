@@ -22,7 +22,7 @@ from torch.nn import functional
 
 from cogmap.geometry.arrays import Booleans, Bytes, Singles
 from cogmap.services.epam.layout import road
-from cogmap.services.epam.recognition import segments
+from cogmap.services.epam.recognition import look, segments
 from cogmap.training.augment import Augmentation, augmented_classes, relit
 from cogmap.training.networks.encoder import OFFSET, SCALE, Encoder, pretrained
 from cogmap.training.networks.export import export, halve
@@ -229,7 +229,7 @@ def write(encoder: Encoder, decoder: Decoder, road_out: Path, segments_out: Path
     """Write both networks, as EPAM reads them, for views of any size."""
     columns, rows = SIZE_PX
     road_shape = (1, road.CHANNELS, rows, columns)
-    segments_shape = (1, segments.CHANNELS, rows, columns)
+    segments_shape = (1, look.CHANNELS, rows, columns)
     export(
         RoadNet(encoder, decoder),
         road_out,
@@ -258,8 +258,11 @@ def views(towns: Iterable[Town]) -> Iterator[Example]:
         ):
             scaled = cv2.resize(image, SIZE_PX, interpolation=cv2.INTER_AREA)
             scaled_m = cv2.resize(depth_m, SIZE_PX, interpolation=cv2.INTER_NEAREST)
-            seen = segments.network_input(
-                scaled.astype(np.uint8), scaled_m.astype(np.float32), town.calibration
+            seen = look.network_input(
+                scaled.astype(np.uint8),
+                scaled_m.astype(np.float32),
+                town.calibration,
+                look.Window.whole(town.calibration),
             )
             yield Example(
                 image=scaled.astype(np.uint8),

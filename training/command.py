@@ -124,8 +124,20 @@ def render(*, data_dir: Path, scale: float, jobs: int) -> None:
     metavar="FILE",
     help="Weights to train further.  [default: train new ones]",
 )
+@click.option(
+    "--far",
+    is_flag=True,
+    help="Train the network that looks more closely at the rows about the horizon, where far "
+    "buildings stand. It is written beside the one for the whole view in --out, as FILE-far.onnx.",
+)
 def segments(
-    *, data_dir: Path, out: Path | None, seed: int, epochs: int | None, start: Path | None
+    *,
+    data_dir: Path,
+    out: Path | None,
+    seed: int,
+    epochs: int | None,
+    start: Path | None,
+    far: bool,
 ) -> None:
     """Train the network that separates the objects of a view.
 
@@ -133,14 +145,17 @@ def segments(
     buildings. Takes about half an hour on one thread of a processor that computes in bfloat16, and
     some two and a half hours on another.
     """
-    from cogmap.services.epam.recognition.segments import DEFAULT_PATH
+    from cogmap.services.epam.recognition.look import FAR, WHOLE
+    from cogmap.services.epam.recognition.segments import DEFAULT_PATH, far_beside
 
     with _needs_torch():
         from cogmap.training.segments import train_on_renderings
 
     weights = out or DEFAULT_PATH
-    measured = train_on_renderings(data_dir, weights, seed=seed, epochs=epochs, start=start)
-    _report(measured, weights)
+    measured = train_on_renderings(
+        data_dir, weights, seed=seed, epochs=epochs, start=start, look=FAR if far else WHOLE
+    )
+    _report(measured, far_beside(weights) if far else weights)
 
 
 @train.command()

@@ -17,18 +17,20 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from cogmap.geometry.arrays import Bytes, Floats, Singles
-from cogmap.services.epam.recognition.segments import (
+from cogmap.services.epam.recognition.look import (
     CHANNELS,
-    HEIGHT_PX,
-    INPUT_SHAPE,
-    OFFSET_PX,
-    OUTPUT_SHAPES,
-    PADDING_PX,
-    WIDTH_PX,
-    Segment,
-    load,
+    FAR,
+    WHOLE,
+    Look,
     network_input,
     padded,
+)
+from cogmap.services.epam.recognition.segments import (
+    OFFSET_PX,
+    OUTPUT_SHAPES,
+    Segment,
+    far_beside,
+    load,
 )
 from cogmap.training.crops import MIN_OVERLAP, overlap
 from cogmap.training.networks.export import adopt, export
@@ -84,18 +86,21 @@ class Examples:
     label: Bytes
 
 
-def examples(towns: Iterable[Town]) -> Examples:
-    """Return all views of `towns`, at the network's resolution."""
+def examples(towns: Iterable[Town], look: Look) -> Examples:
+    """Return all views of `towns`, as a network sees them."""
     values = []
     labels = []
-    size = (WIDTH_PX, HEIGHT_PX)
+    *_, height, width = look.shape
+    size = (width, height - 2 * look.padding_px)
     for town in towns:
+        window = look.window(town.calibration)
         for image, depth_m, label in zip(town.left, town.stereo_m, town.label, strict=True):
-            small = cv2.resize(image, size, interpolation=cv2.INTER_AREA).astype(np.uint8)
-            small_m = cv2.resize(depth_m, size, interpolation=cv2.INTER_NEAREST)
-            example = network_input(small, small_m.astype(np.float32), town.calibration)
+            rows = window.rows
+            small = cv2.resize(image[rows], size, interpolation=cv2.INTER_AREA).astype(np.uint8)
+            small_m = cv2.resize(depth_m[rows], size, interpolation=cv2.INTER_NEAREST)
+            example = network_input(small, small_m.astype(np.float32), town.calibration, window)
             values.append(example.astype(np.float16))
-            labels.append(cv2.resize(label, size, interpolation=cv2.INTER_NEAREST))
+            labels.append(cv2.resize(label[rows], size, interpolation=cv2.INTER_NEAREST))
 
     return Examples(np.asarray(values), np.asarray(labels, np.uint8))
 
@@ -177,21 +182,34 @@ def augmented(
     # Depth is lost in some patches, and what follows from it.
     if rng.random() < 0.3:
         coarse = rng.random((15, 20), np.float32)
-        field = cv2.resize(coarse, (WIDTH_PX, HEIGHT_PX))
+        height, width = label.shape
+        field = cv2.resize(coarse, (width, height))
         varied[3:6, field < rng.uniform(0, 0.4)] = 0.0
 
     return varied, label
 
 
 def train_on_renderings(
-    folder: Path, out: Path, *, seed: int, epochs: int | None = None, start: Path | None = None
+    folder: Path,
+    out: Path,
+    *,
+    seed: int,
+    epochs: int | None = None,
+    start: Path | None = None,
+    look: Look = WHOLE,
 ) -> dict[str, float]:
     """Train on the towns in `folder`/train and `folder`/blocks, from the weights in `start` on if
-    there are any, write the network to `out`, and return its `metrics`.
+    there are any, write the network to `out`, or for a closer look beside it, and return the
+    `metrics` of what is there then.
 
-    Raises UsageError if there are no renderings, or `start` has other layers; ConfigError
-    if it holds no network that separates objects.
+    Raises UsageError if there are no renderings, or `start` has other layers; ConfigError if it, or
+    for a closer look `out`, holds no network that separates objects.
     """
+    weights = out
+    if look is FAR:
+        load(out)
+        weights = far_beside(out)
+
     seed_torch(seed)
     rng = np.random.default_rng(seed)
     net = SegmentationNet()
@@ -206,11 +224,11 @@ def train_on_renderings(
     with Progress() as progress:
         found = [*files(folder, "train"), *files(folder, "blocks")]
         paths = progress.track(found, description="reading")
-        known = examples(read(path) for path in paths)
+        known = examples((read(path) for path in paths), look)
         net.to(memory_format=torch.channels_last)
-        _fit(net, known, rng, schedule, progress)
+        _fit(net, known, look, rng, schedule=schedule, progress=progress)
 
-    export(net, out, "seen", INPUT_SHAPE, OUTPUT_SHAPES)
+    export(net, weights, "seen", look.shape, OUTPUT_SHAPES)
     of_blocks = {
         f"blocks_{key}": value for key, value in metrics(folder, out, "blocks-val").items()
     }
@@ -220,7 +238,9 @@ def train_on_renderings(
 def _fit(
     net: SegmentationNet,
     known: Examples,
+    look: Look,
     rng: np.random.Generator,
+    *,
     schedule: Schedule,
     progress: Progress,
 ) -> None:
@@ -228,19 +248,20 @@ def _fit(
     optimizer = Optimizer(net.parameters(), steps, schedule.max_rate, WEIGHT_DECAY)
 
     task = progress.add_task("training", total=steps)
-    batches = partial(_batches, known, steps, rng)
+    batches = partial(_batches, known, look, steps, rng)
     for values, wanted in prefetch(batches):
         batch = values.contiguous(memory_format=torch.channels_last)
         with mixed_precision():
-            padded_output = net(batch)
+            padded_output = net(batch).float()
 
-        output = padded_output[:, :, PADDING_PX:-PADDING_PX].float()
+        rows = padded_output.shape[2]
+        output = padded_output[:, :, look.padding_px : rows - look.padding_px]
         value = optimizer.step(loss(output, wanted))
         progress.update(task, advance=1, description=f"training, loss {value:.3f}")
 
 
 def _batches(
-    known: Examples, steps: int, rng: np.random.Generator
+    known: Examples, look: Look, steps: int, rng: np.random.Generator
 ) -> Iterator[tuple[Singles, Singles]]:
     for chosen in shuffled(len(known.label), BATCH, steps, rng):
         inputs = []
@@ -250,7 +271,7 @@ def _batches(
             inputs.append(values)
             targets.append(target(label))
 
-        yield padded(np.stack(inputs)), np.stack(targets)
+        yield padded(np.stack(inputs), look.padding_px), np.stack(targets)
 
 
 def metrics(folder: Path, weights: Path, split: str) -> dict[str, float]:

@@ -42,8 +42,8 @@ SAME_COSINE = 0.9
 MIN_EVIDENCE = 0.02
 # The sides of a building whose size is not known, as the simulator's catalogue has them, with their
 # standard deviations; and that of sides that were taught.
-USUAL_SIDES_M = (10.5, 8.5)
-USUAL_SIDES_SD_M = (2.4, 1.6)
+USUAL_SIDES_M = (9.5, 9.5)
+USUAL_SIDES_SD_M = (2.2, 2.2)
 KNOWN_SD_M = 0.02
 # Beside the fit's own: the shape is not known to be a rectangle, nor an end to be the object's.
 UNKNOWN_SHAPE_SD_M = 0.7

@@ -25,9 +25,10 @@ from cogmap.services.epam.layout.footprint_model import (
     linearized,
 )
 
-# Starts of a fit, evenly over half a turn, as a rectangle has; a bound on its steps; and its first
-# damping, 0.1 of the diagonal, lowered as after a step that improved the fit.
-ORIENTATIONS = 10
+# Between two starts of a fit, which are over half a turn, as a rectangle has, and over a quarter
+# where both sides are expected to be the same; a bound on its steps; and its first damping, 0.1 of
+# the diagonal, lowered as after a step that improved the fit.
+START_TURN_RAD = math.pi / 10
 ITERATIONS = 8
 FIRST_DAMPING = 0.1 * 0.2
 # Errors of neighbouring columns are correlated: this many columns count as one.
@@ -63,6 +64,13 @@ class Silhouette:
     right_true: bool
     sides_m: tuple[float, float]
     sides_sd_m: tuple[float, float]
+
+    @property
+    def starts(self) -> int:
+        """Return from how many orientations it is fitted."""
+        sides = zip(self.sides_m, self.sides_sd_m, strict=True)
+        is_square = len(set(sides)) == 1
+        return round((math.pi / 2 if is_square else math.pi) / START_TURN_RAD)
 
 
 @dataclass(frozen=True)
@@ -119,24 +127,28 @@ def locate(silhouettes: list[Silhouette], camera: Calibration) -> list[ObjectPos
         return []
 
     objects = _stacked(silhouettes, camera)
-    rows = np.repeat(np.arange(len(silhouettes)), ORIENTATIONS)
-    problem = objects.take(rows)
-    solution = _solve(_starts(objects), problem)
+    starts = [silhouette.starts for silhouette in silhouettes]
+    problem = objects.take(np.repeat(np.arange(len(silhouettes)), starts))
+    start = np.concatenate([np.arange(count) for count in starts])
+    solution = _solve(_started(problem, START_TURN_RAD * start), problem)
 
     # The root mean square residual of the disparities, in standard deviations of one column.
     error_px = solution.residuals[:, :COLUMNS] * problem.sd_px[:, None]
     rms_px = np.sqrt((error_px**2).mean(1))
     misfits = np.asarray(rms_px / DISPARITY_SD_PX)
 
-    shape = (len(silhouettes), ORIENTATIONS)
-    parameters = solution.parameters.reshape(*shape, PARAMETERS)
-    costs = (solution.residuals**2).sum(1).reshape(shape)
-    covariances = _covariances(solution, problem).reshape(*shape, PARAMETERS, PARAMETERS)
-    least_misfits = misfits.reshape(shape).min(1)
-
+    costs = (solution.residuals**2).sum(1)
+    covariances = _covariances(solution, problem)
+    ends = np.cumsum(starts)
     return [
-        _mean_pose(parameters[row], costs[row], covariances[row], least_misfits[row], camera)
-        for row in range(len(silhouettes))
+        _mean_pose(
+            solution.parameters[end - count : end],
+            costs[end - count : end],
+            covariances[end - count : end],
+            misfits[end - count : end].min(),
+            camera,
+        )
+        for count, end in zip(starts, ends, strict=True)
     ]
 
 
@@ -176,28 +188,22 @@ def _stacked(silhouettes: list[Silhouette], camera: Calibration) -> FootprintPro
     )
 
 
-def _starts(objects: FootprintProblem) -> Floats:
-    """Place ORIENTATIONS starts an object, (s * ORIENTATIONS, PARAMETERS), behind the middle of the
-    wall that is seen, with the sides that are expected.
+def _started(problem: FootprintProblem, turned_rad: Floats) -> Floats:
+    """Return where each fit begins, (s, PARAMETERS): behind the middle of the wall that is seen,
+    turned by `turned_rad` (s,) from the line of sight, with the sides that are expected.
     """
-    camera = objects.camera
-    right_px = objects.edge_px.mean(1) - camera.cx_px
+    camera = problem.camera
+    right_px = problem.edge_px.mean(1) - camera.cx_px
     slope = np.asarray(right_px / camera.fx_px)
 
     focal_baseline = camera.fx_px * camera.baseline_m
-    depth_m = focal_baseline / np.median(objects.disparity_px, axis=1)
+    depth_m = focal_baseline / np.median(problem.disparity_px, axis=1)
     distance_m = depth_m * np.hypot(slope, 1)
 
-    half_m = objects.half_m.mean(1)
-    behind = 1 + 0.8 * half_m / distance_m
-    centre = np.stack([slope * depth_m * behind, depth_m * behind, np.zeros_like(depth_m)], axis=1)
-
-    orientations = np.linspace(0, np.pi, ORIENTATIONS, endpoint=False)
-    starts = np.repeat(centre, ORIENTATIONS, axis=0)
-    starts[:, 2] = np.tile(orientations, len(centre))
-    starts[:, 2] -= np.repeat(np.arctan(slope), ORIENTATIONS)
-    halves_m = np.repeat(objects.half_m, ORIENTATIONS, axis=0)
-    return np.concatenate([starts, halves_m], axis=1)
+    behind = 1 + 0.8 * problem.half_m.mean(1) / distance_m
+    orientation = turned_rad - np.arctan(slope)
+    centre = np.stack([slope * depth_m * behind, depth_m * behind, orientation], axis=1)
+    return np.concatenate([centre, problem.half_m], axis=1)
 
 
 def _solve(parameters: Floats, problem: FootprintProblem) -> _Solution:

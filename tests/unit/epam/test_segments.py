@@ -5,33 +5,34 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
+from cogmap.services.epam.recognition.look import Window, network_input
 from cogmap.services.epam.recognition.segments import (
-    HEIGHT_PX,
     OFFSET_PX,
-    WIDTH_PX,
     Segment,
     divided,
     load,
-    network_input,
+    with_closer,
 )
 from cogmap.services.epam.recognition.walls import Walls, walls
 from tests.support.world.blocks import CAMERA
 
 SIZE = (240, 320)
+HALF = (120, 160)
 WALL_PX = 8.0
 Box = tuple[int, int, int, int]
 
 
 def _answer(*boxes: Box, peaks: list[tuple[int, int]]) -> np.ndarray:
     """Buildings in boxes (left, top, right, bottom), each pixel of which points to the peak
-    (column, row).
+    (column, row), at half the view's resolution.
     """
-    shown = np.zeros((4, HEIGHT_PX, WIDTH_PX), np.float32)
+    shown = np.zeros((4, *HALF), np.float32)
     shown[0] = -8.0
-    rows, columns = np.indices((HEIGHT_PX, WIDTH_PX))
+    rows, columns = np.indices(HALF)
     for (left, top, right, bottom), (column, row) in zip(boxes, peaks, strict=True):
         area = slice(top, bottom), slice(left, right)
         shown[0][area] = 8.0
@@ -43,7 +44,7 @@ def _answer(*boxes: Box, peaks: list[tuple[int, int]]) -> np.ndarray:
 
 
 def _divided(shown: np.ndarray) -> list[Segment]:
-    return divided(shown, (240, 320))
+    return divided(shown, SIZE)
 
 
 def test_two_buildings_side_by_side_are_two_segments_from_left_to_right() -> None:
@@ -125,10 +126,10 @@ def test_an_image_without_contrast_has_no_segments(level: int) -> None:
 
 
 def test_the_network_receives_height_and_where_depth_is_unknown() -> None:
-    small = np.zeros((HEIGHT_PX, WIDTH_PX, 3), np.uint8)
-    depth_m = np.full((HEIGHT_PX, WIDTH_PX), 20.0, np.float32)
+    small = np.zeros((*HALF, 3), np.uint8)
+    depth_m = np.full(HALF, 20.0, np.float32)
     depth_m[:10] = 0.0
-    values = network_input(small, depth_m, CAMERA)
+    values = network_input(small, depth_m, CAMERA, Window.whole(CAMERA))
     height = values[5]
 
     assert values[4, :10].max() == 0.0
@@ -138,6 +139,53 @@ def test_the_network_receives_height_and_where_depth_is_unknown() -> None:
     horizon = round(CAMERA.cy_px / 2)
     assert height[horizon, 50] == pytest.approx(CAMERA.mount_height_m / 5, abs=0.02)
     assert height[20, 50] > height[100, 50]
+
+
+def _box(left: int, top: int, right: int, bottom: int) -> Segment:
+    mask = np.zeros(SIZE, np.bool_)
+    mask[top:bottom, left:right] = True
+    return Segment.of(mask)
+
+
+def test_small_segments_about_the_horizon_are_those_of_the_closer_look() -> None:
+    far = _box(100, 90, 140, 110)
+    near = _box(200, 20, 300, 180)
+    one_of_two = _box(100, 90, 119, 110)
+    other_of_two = _box(121, 90, 140, 110)
+    before_near = _box(250, 80, 270, 120)
+    window = Window.far(CAMERA)
+    closely = [one_of_two, other_of_two, before_near]
+
+    found = with_closer([far, near], closely, window)
+    assert {each.box_px for each in found} == {
+        each.box_px for each in (near, one_of_two, other_of_two)
+    }
+
+
+def test_a_small_segment_that_leaves_the_closer_look_is_kept() -> None:
+    window = Window.far(CAMERA)
+    over_it = _box(100, window.top_px - 10, 120, window.top_px + 10)
+
+    assert with_closer([over_it], [], window) == [over_it]
+    assert with_closer([], [], window) == []
+
+
+def test_the_closer_look_of_a_low_camera_image_is_all_of_it() -> None:
+    low = msgspec.structs.replace(CAMERA, height_px=60, cy_px=30.0)
+
+    assert Window.far(low) == Window.whole(low)
+    assert Window.far(CAMERA).rows.stop <= CAMERA.height_px
+
+
+def test_both_looks_see_a_pixel_at_the_same_height_and_place() -> None:
+    image = np.zeros((*SIZE, 3), np.uint8)
+    depth_m = np.full(SIZE, 20.0, np.float32)
+    window = Window.far(CAMERA)
+    rows = window.rows
+    whole = network_input(image, depth_m, CAMERA, Window.whole(CAMERA))
+    closely = network_input(image[rows], depth_m[rows], CAMERA, window)
+
+    assert closely == pytest.approx(whole[:, rows], abs=1e-5)
 
 
 def _segment(left: int, right: int) -> Segment:

@@ -49,16 +49,17 @@ from pathlib import Path
 import numpy as np
 import torch
 from cogmap.services.epam.network import Network
-from cogmap.services.epam.recognition.segments import DEFAULT_PATH, INPUT_SHAPE, OUTPUT_SHAPES
+from cogmap.services.epam.recognition.look import WHOLE
+from cogmap.services.epam.recognition.segments import DEFAULT_PATH, OUTPUT_SHAPES
 from cogmap.training.networks.export import adopt
 from cogmap.training.segments import SegmentationNet
 
 net = SegmentationNet().eval()
 adopt(net, DEFAULT_PATH)
-view = np.random.default_rng(1).normal(size=INPUT_SHAPE).astype(np.float32)
+view = np.random.default_rng(1).normal(size=WHOLE.shape).astype(np.float32)
 with torch.no_grad():
     found = net(torch.from_numpy(view)).numpy()
-(wanted,) = Network(DEFAULT_PATH, INPUT_SHAPE, OUTPUT_SHAPES, "cpu")(view)
+(wanted,) = Network(DEFAULT_PATH, WHOLE.shape, OUTPUT_SHAPES, "cpu")(view)
 print(float(np.abs(found - wanted).max() / np.abs(wanted).max()))
 """
 BATCHES = """
@@ -207,11 +208,11 @@ def test_segments_and_objects_are_learned_from_renderings_the_same_each_time(
 
     first = tmp_path / "a"
     again = tmp_path / "b"
-    for name in ("segments", "objects"):
-        printed = _trained(name, tmp_path, first)
-        assert _trained(name, tmp_path, again) == printed
+    for name, *options in (["segments"], ["segments", "--far"], ["objects"]):
+        printed = _trained(name, tmp_path, first, *options)
+        assert _trained(name, tmp_path, again, *options) == printed
 
-    for name in ("segments.onnx", "objects.onnx", "objects.json"):
+    for name in ("segments.onnx", "segments-far.onnx", "objects.onnx", "objects.json"):
         assert (first / name).read_bytes() == (again / name).read_bytes()
 
     recognizer = objects.load(first / "objects.onnx")
@@ -223,13 +224,22 @@ def test_segments_and_objects_are_learned_from_renderings_the_same_each_time(
     assert all(segment.mask.shape == depth_m.shape for segment in found)
 
 
-def _trained(name: str, folder: Path, out: Path) -> str:
-    """Train for one epoch, and return what is printed, without the file's name."""
+def _trained(name: str, folder: Path, out: Path, *options: str) -> str:
+    """Train for one epoch, and return what is printed, without the folder of the weights."""
     weights = str(out / f"{name}.onnx")
-    options = ["--out", weights, "--epochs", "1", "--seed", "3"]
-    done = _python("-m", "training", name, str(folder), *options)
+    chosen = ["--out", weights, "--epochs", "1", "--seed", "3", *options]
+    done = _python("-m", "training", name, str(folder), *chosen)
     assert done.returncode == 0, done.stderr
-    return done.stdout.replace(weights, "")
+    return done.stdout.replace(str(out), "")
+
+
+@needs_torch
+def test_the_closer_look_is_trained_beside_a_network_for_the_whole_view(tmp_path: Path) -> None:
+    weights = str(tmp_path / "a.onnx")
+    done = _python("-m", "training", "segments", str(tmp_path), "--far", "--out", weights)
+
+    assert done.returncode == 2
+    assert f"no weights {weights}" in done.stderr
 
 
 @needs_torch
