@@ -72,7 +72,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     segments_weights: Annotated[
         WeightsPath,
         msgspec.Meta(
-            description="ONNX file of the segmentation network; empty: that of `weights`."
+            description="ONNX file of the segmentation network, with that of the closer look "
+            "beside it, as FILE-far.onnx, if there is one; empty: those of `weights`."
         ),
     ] = ""
     object_weights: Annotated[

@@ -323,7 +323,8 @@ def _left_of(plan: Plan, agent: Self, costs: PlaceCosts) -> Indices:
 
 def _serves(outcome: Outcome, situation: Situation) -> bool:
     """Decide whether the plan before leads to the same goals as a new one, nearly as cheaply, from
-    where the agent is.
+    where the agent is. At the end of its route it leads nowhere: the place of a goal moves with the
+    object on the map.
     """
     _, _, plan, costs, network = outcome
     _, _, agent, config, before = situation
@@ -336,7 +337,7 @@ def _serves(outcome: Outcome, situation: Situation) -> bool:
     cells = _cells(plan, costs)
     moved = np.abs(_cells(before, costs)[-1] - cells[-1]).max()
     is_off = away_m.min() > OFF_ROUTE_M
-    is_at_end = plan.explores and away_m[-1] <= config.reached_m
+    is_at_end = away_m[-1] <= config.reached_m
     if is_off or is_at_end or moved > SAME_FRONTIER_CELLS // 2:
         return False
 

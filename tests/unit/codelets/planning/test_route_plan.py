@@ -152,6 +152,22 @@ def test_a_new_goal_is_replayed_forward_once() -> None:
     assert second.events == []
 
 
+def test_at_the_end_of_its_route_an_agent_follows_an_object_that_has_moved_on_the_map() -> None:
+    bakery = Object(id=object_id("bakery"), label="bakery", x_m=30.0, y_m=-12.0)
+    graph = loop(bakery, Goal(id=goal_id("bakery"), object="bakery"))
+    plan = planned(graph)
+    assert plan.route is not None
+    end_x_m, end_y_m = plan.route.numpy()[-1].tolist()
+
+    # It came to the end, and the object has meanwhile moved by a little more than counts as there.
+    moved = msgspec.structs.replace(bakery, x_m=bakery.x_m + 3.0)
+    graph.change([moved, agent(x_m=end_x_m, y_m=end_y_m)])
+    after = planned(graph)
+
+    assert after.route is not None
+    assert after.route.numpy()[-1] == pytest.approx((end_x_m + 3.0, end_y_m))
+
+
 def test_a_plan_that_serves_is_not_written_again() -> None:
     graph = loop(goal_at("b", 40.0, 0.0))
     answered(graph)
