@@ -82,8 +82,8 @@ def measure(
     buildings. Then it drives to ten buildings of each by the names that it has given them; its
     error is compared with that of fused self-motion alone over the first ten minutes. The names
     that perception was taught are judged in ten towns more, where three in ten buildings have one.
-    Ten minutes in towns of equal houses in two looks follow, at the level of percepts. Takes more
-    than two hours on two cores.
+    Ten minutes in towns of equal houses in two looks follow, at the level of percepts. Takes some
+    four hours on two cores.
     """
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
