@@ -14,7 +14,8 @@ from cogmap.schemas.sensing import Calibration
 
 CHANNELS = 8
 # Of the closer look: its width is the camera's; and rows, so many of them over the horizon. Of the
-# buildings with 50 to 1,600 pixels in 270 views of three towns, 95 % end within these rows.
+# buildings with 50 to 1,600 pixels in 270 views of three towns, 95 % begin at most 58 rows over the
+# horizon, and 95 % end at most 13 under it.
 FAR_WIDTH_PX = 320
 FAR_HEIGHT_PX = 80
 FAR_ABOVE_PX = 62

@@ -60,9 +60,10 @@ CONTRAST_STRIDE = 4
 # Pieces of one building: where they meet, both point to places nearer to each other than this
 # share of the square root of their area.
 SAME_CENTRE = 0.04
-# A segment with a smaller share of the view is looked at more closely (of 0.02, 0.04 and 0.08 the
-# one with which most buildings were found, in 135 views of three towns of blocks). What that finds
-# is a segment if so many of its pixels, and half of them, belong to none that is larger.
+# A segment with a smaller share of the view is looked at more closely. In 135 views of three towns
+# of blocks fewer small buildings were found with 0.02; with 0.08 as many, but fewer large ones.
+# What that finds is a segment if so many of its pixels, and half of them, belong to none that is
+# larger.
 FAR_AREA_SHARE = 0.04
 MIN_FAR_PIXELS = 40
 MIN_FREE_SHARE = 0.5
