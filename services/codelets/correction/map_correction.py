@@ -124,8 +124,12 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
             judged = msgspec.structs.replace(closure, consistent=agrees, accepted=holds)
             operations.append(judged)
 
+    # Sightings of landmarks that come again bind the path too, also those that are too uncertain
+    # for their closures to agree: far buildings seen by cameras.
     closed_before = {closure.id for closure in closures if closure.accepted}
-    if closed == closed_before:
+    fresh = [closure for closure in closures if closure.accepted is None]
+    binds = config.correct == "heading" and any(not closure.sd_rad for closure in fresh)
+    if closed == closed_before and not binds:
         return Answer(operations)
 
     seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])

@@ -50,9 +50,9 @@ def true_poses(frames: int) -> np.ndarray:
     return poses
 
 
-def seen(pose: np.ndarray, label: str, position_m: Position) -> Percept:
+def seen(pose: np.ndarray, label: str, position_m: Position, range_sd_m: float = 0.2) -> Percept:
     """A landmark as seen without error."""
-    return percept_at(pose, label, position_m, bearing_sd_rad=0.01, range_sd_m=0.2)
+    return percept_at(pose, label, position_m, bearing_sd_rad=0.01, range_sd_m=range_sd_m)
 
 
 class LoopDrive:
@@ -64,11 +64,13 @@ class LoopDrive:
         workers: int = 1,
         run: Run = LOCKSTEP,
         bias_rad: float = 0.0,
+        range_sd_m: float = 0.2,
         **settings: object,
     ):
         names = [f"w{number}" for number in range(workers)]
         self.desk = Desk(*names, run=run, codelets=worker, **settings)
         self.bias_rad = bias_rad
+        self.range_sd_m = range_sd_m
         self.poses = true_poses(3 * LAP)
         self.frame = 0
 
@@ -122,7 +124,7 @@ class LoopDrive:
     def _view(self, landmarks: Landmarks) -> Percepts:
         """The landmarks and the road, seen without error."""
         pose = self.poses[self.frame]
-        objects = [seen(pose, label, position_m) for label, position_m in landmarks.items()]
+        objects = [seen(pose, *each, self.range_sd_m) for each in landmarks.items()]
         return percepts(self.frame, *objects, road_m=ROAD_M)
 
 

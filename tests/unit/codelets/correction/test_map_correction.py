@@ -312,6 +312,21 @@ def test_two_views_are_too_few_to_close_a_loop() -> None:
     assert drive.error_m() == pytest.approx(before_m, abs=0.5)
 
 
+def test_landmarks_too_uncertain_for_their_closures_to_agree_correct_the_path_together() -> None:
+    config = msgspec.structs.replace(QUIET, correct="heading")
+    street = {f"house {number}": (8.0 + 4.0 * number, 6.0) for number in range(6)}
+    drive = LoopDrive(config, range_sd_m=6.0)
+    drive.go(3, street)
+    drive.go(LAP - 3, {})
+    before_m = drive.error_m()
+
+    drive.meet(6, street)
+    drive.go(6, {})
+
+    assert not any(_accepted(drive.desk))
+    assert drive.error_m() < 0.8 * before_m
+
+
 def test_closures_that_agree_beyond_possible_drift_are_rejected() -> None:
     drive = LoopDrive()
     drive.go(LAP // 2, {})
