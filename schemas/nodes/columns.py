@@ -83,7 +83,8 @@ class ObservationColumn(enum.IntEnum):
     """Columns of observations of a landmark from places of the path.
 
     Where it stood as seen from the place, forwards and left; the standard deviations along and
-    across the line of sight, and that line's direction.
+    across the line of sight, and that line's direction; 1 if it was seen whole, 0 if something
+    nearer or the view's border hid a part of it.
     """
 
     STAMP_S = 0
@@ -92,6 +93,7 @@ class ObservationColumn(enum.IntEnum):
     ALONG_SD_M = 3
     ACROSS_SD_M = 4
     DIRECTION_RAD = 5
+    WHOLE = 6
 
 
 class RangeColumn(enum.IntEnum):

@@ -37,7 +37,7 @@ class PathSegment(GraphNode, kw_only=True, frozen=True, tag="path_segment"):
 class Observations(GraphNode, kw_only=True, frozen=True, tag="observations"):
     """Observations of one landmark from places of path segment `number`.
 
-    `rows`: float64 (n, 6), see ObservationColumn. `ranges`: float64 (m, 5), see RangeColumn, are
+    `rows`: float64 (n, 7), see ObservationColumn. `ranges`: float64 (m, 5), see RangeColumn, are
     those by range alone.
     """
 

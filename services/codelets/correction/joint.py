@@ -35,6 +35,9 @@ def optimize_jointly(
     which binds one pass to the next past the same side, and bends neither. Sightings in a row err
     alike: CORRELATED of them count as one. Points have one side, and their sightings err
     independently.
+
+    `seen` are sightings of whole landmarks: the part of one that shows at the view's border moves
+    with the agent, and would bend the path.
     """
     # Ranges are led from what is believed, which they have corrected before: each correction begins
     # where the last one ended.

@@ -132,7 +132,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if closed == closed_before and not binds:
         return Answer(operations)
 
-    seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])
+    seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP]).of_whole()
     heard = Ranges.of(graph.of_kind(Observations), rows[:, STAMP])
     poses, replays = corrected(judgement.path, seen, heard, config)
     if config.anchor == "map":

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.estimation.pose_graph import Constraints, matvec
-from cogmap.geometry.arrays import Floats, Indices
+from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import rotation_matrices
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.nodes import ObservationColumn, Observations, RangeColumn, observations_id
@@ -25,6 +25,7 @@ STAMP = ObservationColumn.STAMP_S
 WHERE = slice(ObservationColumn.FORWARDS_M, ObservationColumn.LEFT_M + 1)
 SPREAD = slice(ObservationColumn.ALONG_SD_M, ObservationColumn.ACROSS_SD_M + 1)
 DIRECTION = ObservationColumn.DIRECTION_RAD
+WHOLE = ObservationColumn.WHOLE
 # An observation that deviates by this many standard deviations counts half as much as one that
 # fits: it may be of another landmark.
 DOUBTED = 2.0
@@ -100,6 +101,7 @@ def _sighting(viewpoint: Viewpoint, percept: Percept) -> list[float]:
         percept.range_sd_m,
         range_m * percept.bearing_sd_rad,
         direction_rad,
+        float(percept.whole),
     ]
 
 
@@ -118,7 +120,7 @@ def _ranges_of(observations: Observations | None) -> Floats:
 
 class Sightings(NamedTuple):
     """m observations as arrays: `place` (m,) on the path, `landmark` (m,) in `labels`, `where_m`
-    (m, 2), `information` (m, 2, 2).
+    (m, 2), `information` (m, 2, 2), and whether it was seen `whole` (m,).
     """
 
     labels: tuple[str, ...]
@@ -126,6 +128,7 @@ class Sightings(NamedTuple):
     landmark: Indices
     where_m: Floats
     information: Floats
+    whole: Booleans
 
     @classmethod
     def of(cls, observations: Iterable[Observations], stamps_s: Floats) -> Sightings:
@@ -154,6 +157,19 @@ class Sightings(NamedTuple):
             landmark=landmark[is_known],
             where_m=known[:, WHERE],
             information=turn * sd_m**-2 @ turn.mT,
+            whole=known[:, WHOLE] > 0,
+        )
+
+    def of_whole(self) -> Sightings:
+        """Choose those of landmarks that were seen whole, and these landmarks."""
+        numbers, landmark = np.unique(self.landmark[self.whole], return_inverse=True)
+        return Sightings(
+            labels=tuple(self.labels[number] for number in numbers.tolist()),
+            place=self.place[self.whole],
+            landmark=landmark,
+            where_m=self.where_m[self.whole],
+            information=self.information[self.whole],
+            whole=self.whole[self.whole],
         )
 
     def weights(self, poses: Floats, landmarks_m: Floats) -> Floats:

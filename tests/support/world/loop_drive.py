@@ -56,21 +56,27 @@ def seen(pose: np.ndarray, label: str, position_m: Position, range_sd_m: float =
 
 
 class LoopDrive:
-    """The mind alone on that drive: percepts made up, a workspace, and real workers."""
+    """The mind alone on that drive: percepts made up, a workspace, and real workers.
+
+    Landmarks have ranges of `range_sd_m`; `beside` is seen in every view.
+    """
 
     def __init__(
         self,
         worker: WorkerConfig = QUIET,
         workers: int = 1,
         run: Run = LOCKSTEP,
+        *,
         bias_rad: float = 0.0,
         range_sd_m: float = 0.2,
+        beside: tuple[Percept, ...] = (),
         **settings: object,
     ):
         names = [f"w{number}" for number in range(workers)]
         self.desk = Desk(*names, run=run, codelets=worker, **settings)
         self.bias_rad = bias_rad
         self.range_sd_m = range_sd_m
+        self.beside = beside
         self.poses = true_poses(3 * LAP)
         self.frame = 0
 
@@ -125,7 +131,7 @@ class LoopDrive:
         """The landmarks and the road, seen without error."""
         pose = self.poses[self.frame]
         objects = [seen(pose, *each, self.range_sd_m) for each in landmarks.items()]
-        return percepts(self.frame, *objects, road_m=ROAD_M)
+        return percepts(self.frame, *self.beside, *objects, road_m=ROAD_M)
 
 
 def round_once(drive: LoopDrive) -> LoopDrive:

@@ -50,7 +50,8 @@ def _sightings(truth: np.ndarray) -> Sightings:
     places = np.tile(np.arange(count), len(LANDMARKS))
     landmark = np.repeat(np.arange(len(LANDMARKS)), count)
     information = np.tile(np.eye(2) / SIGHTING_SD_M**2, (len(places), 1, 1))
-    return Sightings(tuple(LANDMARKS), places, landmark, np.vstack(seen_m), information)
+    whole = np.ones(len(places), bool)
+    return Sightings(tuple(LANDMARKS), places, landmark, np.vstack(seen_m), information, whole)
 
 
 def _graph(steps: Constraints) -> PoseGraph:
@@ -108,7 +109,7 @@ def test_sides_bind_the_second_lap_to_the_first() -> None:
 def test_a_path_without_sightings_is_optimized_alone() -> None:
     graph = _graph(_steps(1))
     none = np.zeros(0, int)
-    nothing = Sightings((), none, none, np.zeros((0, 2)), np.zeros((0, 2, 2)))
+    nothing = Sightings((), none, none, np.zeros((0, 2)), np.zeros((0, 2, 2)), none > 0)
 
     poses, _ = optimize_jointly(graph, nothing, NOTHING_HEARD, Config())
     assert poses == pytest.approx(optimize(graph))

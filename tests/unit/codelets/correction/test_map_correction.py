@@ -25,8 +25,9 @@ from cogmap.schemas.nodes import (
     nearest_place,
     object_id,
 )
+from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.mapping.path import ODOMETRY, POSE, STAMP
-from cogmap.testing import stamp_ns
+from cogmap.testing import percept, stamp_ns
 from tests.support.paths import mean_distance_m, steps_m
 from tests.support.world.loop_drive import HOUSE, LAP, QUIET, SLIP, TOWER, LoopDrive, round_once
 from tests.support.world.scenes import Desk
@@ -325,6 +326,22 @@ def test_landmarks_too_uncertain_for_their_closures_to_agree_correct_the_path_to
 
     assert not any(_accepted(drive.desk))
     assert drive.error_m() < 0.8 * before_m
+
+
+def _lap_error_m(*beside: Percept) -> float:
+    """How far the path is from the truth once a loop was closed with `beside` in every view."""
+    config = msgspec.structs.replace(QUIET, correct="heading")
+    drive = round_once(LoopDrive(config, beside=beside))
+    drive.meet(3, TOWER)
+    drive.go(5, {})
+    return _path_error_m(drive)
+
+
+def test_a_wall_that_shows_in_part_wherever_the_agent_is_does_not_bend_its_path() -> None:
+    # What is in view of it moves with the agent: it stands nowhere.
+    wall = percept("wall", math.pi / 2, 5.0, range_sd_m=0.3, bearing_sd_rad=0.05, whole=False)
+
+    assert _lap_error_m(wall) == pytest.approx(_lap_error_m(), rel=0.05)
 
 
 def test_closures_that_agree_beyond_possible_drift_are_rejected() -> None:

@@ -93,7 +93,7 @@ def _rows(graph: Graph, number: int) -> Floats:
 
 def _seen(number: int, stamp_s: float, forwards_m: float) -> Observations:
     """The inn, straight ahead of a place of the path."""
-    row = [stamp_s, forwards_m, 0.0, 0.3, 0.1, 0.0]
+    row = [stamp_s, forwards_m, 0.0, 0.3, 0.1, 0.0, 1.0]
     return Observations(
         id=observations_id(number, "inn"), number=number, landmark="inn", rows=Matrix.of([row])
     )

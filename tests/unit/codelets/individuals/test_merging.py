@@ -12,6 +12,7 @@ from cogmap.schemas.nodes import (
     LinkKind,
     LoopClosure,
     Object,
+    ObservationColumn,
     Observations,
     goal_id,
     nearest_place,
@@ -30,7 +31,7 @@ def _house(label: str, x_m: float, **facts: object) -> Object:
 
 
 def _observed(label: str, *stamps_s: float) -> Observations:
-    rows = np.zeros((len(stamps_s), 6))
+    rows = np.zeros((len(stamps_s), len(ObservationColumn)))
     rows[:, 0] = stamps_s
     name = observations_id(0, label)
     return Observations(id=name, number=0, landmark=label, rows=Matrix.of(rows))

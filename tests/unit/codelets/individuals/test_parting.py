@@ -43,7 +43,7 @@ def _town(there_from: int, there_m: tuple[float, float] = THERE_M, *others: Obje
     rows = []
     for step in range(STEPS):
         x_m, y_m = HERE_M if step < there_from else there_m
-        rows.append([step, x_m - step, y_m, 0.5, 0.3, math.atan2(y_m, x_m - step)])
+        rows.append([step, x_m - step, y_m, 0.5, 0.3, math.atan2(y_m, x_m - step), 1.0])
     observed = Observations(
         id=observations_id(0, "1a"), number=0, landmark="1a", rows=Matrix.of(np.array(rows))
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -103,6 +104,20 @@ def test_an_eye_that_sees_too_far_is_known_to() -> None:
 
     seen = Sightings.of([node], np.array([1.0]))
     assert seen.where_m[0] == pytest.approx((8.0, 0.0))
+
+
+def test_sightings_of_whole_landmarks_are_told_from_those_of_a_part() -> None:
+    viewpoint = Viewpoint(0, 1.0, STILL, 0.0)
+    part = msgspec.structs.replace(_tower(), label="barn", whole=False)
+    nodes = [extended(None, viewpoint, part), extended(None, viewpoint, _tower())]
+
+    seen = Sightings.of(nodes, np.array([1.0]))
+    whole = seen.of_whole()
+
+    assert seen.labels == ("barn", "tower")
+    assert whole.labels == ("tower",)
+    assert whole.landmark.tolist() == [0]
+    assert whole.where_m == pytest.approx(seen.where_m[1:])
 
 
 def test_a_landmark_stands_where_most_of_its_sightings_put_it() -> None:
