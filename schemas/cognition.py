@@ -17,7 +17,7 @@ from cogmap.schemas.nodes import AnyNode
 
 
 class Replay(Message, kw_only=True, frozen=True, tag="replay"):
-    """A loop closed by reverse replay, and what it predicts of place cells (paper §5.6).
+    """The path corrected by reverse replay, and what that predicts of place cells (paper §5.6).
 
     Positions of the path in the order in which they are replayed, the newest first: `stamps_ns`
     int64 (n,) when the agent was there, `positions_m` float64 (n, 2) where it took itself to have

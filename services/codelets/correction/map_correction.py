@@ -1,5 +1,5 @@
-"""The map correction codelet: a loop that closes corrects the path, and with it the map (paper
-§5.6, eq. 5-9).
+"""The map correction codelet: a loop that closes, or a landmark that comes again, corrects the
+path, and with it the map (paper §5.6, eq. 5-9).
 
 It may take longer than a cycle. So it writes nothing that others write meanwhile: it leaves a
 Correction node for the apply-correction codelet.
