@@ -1,5 +1,6 @@
 """Places recognized along a walk through which somebody walked before: EPAM's own memory of places
-gets the pictures of both walks, one after the other.
+gets the pictures of both walks, one after the other, and is restored between them, as on another
+day.
 """
 
 from __future__ import annotations
@@ -85,6 +86,11 @@ def _walk(reference: list[Bytes | None], query: list[Bytes | None], learning: bo
     answers = []
 
     for frame, code in enumerate([*reference, *query]):
+        if frame == len(reference):
+            remembered = recognizer.all
+            recognizer = PlaceRecognizer()
+            recognizer.restore(remembered)
+
         learns = learning or frame < len(reference)
         matches, _ = recognizer.observe(frame, frame * FRAME_NS, code, learns)
         nearest = recognizer.nearest

@@ -62,6 +62,7 @@ class PlaceRecognizer:
         self._step_of_view = np.empty(0, np.int64)
         self._standard = Standard()
         self._chance = Chance()
+        self._is_restored = False
 
         self._belief = np.empty(0)
         self._p_new = 1.0
@@ -94,6 +95,10 @@ class PlaceRecognizer:
         if code is None:
             return [], []
 
+        if self._is_restored:
+            self._standard.begin_drive()
+            self._is_restored = False
+
         last = self._last_code
         if last is not None and self._standard.change(code, last) < CHANGE_AT_REST:
             return list(self._matches), []
@@ -113,8 +118,8 @@ class PlaceRecognizer:
         return [], [view]
 
     def restore(self, views: Iterable[RememberedView]) -> None:
-        """Remember `views` again, the oldest first; the robot is where the last one was taken.
-        Raises MessageError if a code has another type or size.
+        """Remember `views` again, the oldest first, before another drive; the robot is where the
+        last one was taken. Raises MessageError if a code has another type or size.
         """
         restored = list(views)
         if not restored:
@@ -134,6 +139,7 @@ class PlaceRecognizer:
         self._step += len(restored)
         self._remember(restored, vectors)
         self._last_code = codes[-1]
+        self._is_restored = True
 
     def _update_belief(self, vector: Singles) -> None:
         """Advance the filter by one step: prediction, then the evidence of `vector`."""

@@ -44,6 +44,12 @@ class Standard:
         variance = np.trace(self._covariance) / CHANNELS
         return float(np.sqrt(np.mean(difference**2) / variance))
 
+    def begin_drive(self) -> None:
+        """Begin a drive, in another light perhaps: what was usual before counts as little as what
+        is usual on photographs, and gives way as fast.
+        """
+        self._views = 0
+
     def add(self, code: Bytes) -> Singles:
         """Count `code`, and return its vector of length 1, float32 (CODE_BYTES,): the inner product
         of two is the similarity of two views.

@@ -18,6 +18,7 @@ from cogmap.schemas.sensing import PlaceMatch, RememberedView
 from cogmap.services.epam import backbone
 from cogmap.services.epam.places.descriptor import CODE_BYTES, code, shows_place
 from cogmap.services.epam.places.recognizer import PlaceRecognizer
+from cogmap.services.epam.places.standard import Standard
 
 Image = npt.NDArray[np.uint8]
 Code = npt.NDArray[np.uint8]
@@ -248,6 +249,24 @@ def test_views_remembered_before_a_restart_are_recognized_after_it() -> None:
     matches, _ = _drive(restarted, again, LENGTH)
     frames = [match.frame for match in matches[10:] if match]
     assert frames == list(range(10, 30))
+
+
+def _likeness(standard: Standard, codes: list[Code | None]) -> float:
+    """How alike successive views of different places are, on average."""
+    vectors = np.stack([standard.add(code) for code in codes if code is not None])
+    return float((vectors[:-1] * vectors[1:]).sum(axis=1).mean())
+
+
+def test_what_another_light_has_in_common_is_usual_sooner_on_a_drive_after_a_restart() -> None:
+    evening = [_route(2).code(place, evening=True) for place in range(0, 30, 3)]
+    going_on = Standard()
+    restarted = Standard()
+    for standard in (going_on, restarted):
+        _likeness(standard, _lap(_route(1)))
+
+    restarted.begin_drive()
+
+    assert _likeness(restarted, evening) < 0.8 * _likeness(going_on, evening)
 
 
 def test_at_rest_after_a_restart_no_view_is_remembered_again() -> None:
