@@ -9,6 +9,7 @@ what the agent believes of its pose is not used. At least MIN_AGREEING must agre
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,8 @@ from cogmap.geometry.se2 import cumulative, integrate, transform_from, wrap_angl
 MIN_AGREEING = 3
 # With more uncertainty between them than this, any two views would agree.
 MAX_SD_M = 5.0
+# Two views that are each more uncertain than this never agree.
+MAX_VIEW_SD_M = MAX_SD_M / math.sqrt(2)
 # Each view is compared with so many that follow it.
 NEIGHBOURS = 31
 

@@ -16,7 +16,7 @@ from scipy.special import chdtri
 from cogmap.estimation.alignment import motion_onto
 from cogmap.estimation.gnc import inliers
 from cogmap.estimation.least_squares import optimize
-from cogmap.estimation.pairwise_consistency import MIN_AGREEING, consistent
+from cogmap.estimation.pairwise_consistency import MAX_VIEW_SD_M, MIN_AGREEING, consistent
 from cogmap.estimation.pose_graph import (
     NO_CONSTRAINTS,
     Constraints,
@@ -124,12 +124,12 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
             judged = msgspec.structs.replace(closure, consistent=agrees, accepted=holds)
             operations.append(judged)
 
-    # Sightings of landmarks that come again bind the path too, also those that are too uncertain
-    # for their closures to agree: far buildings seen by cameras.
+    # Landmarks too uncertain for their closures to agree, as far buildings seen by cameras, bind
+    # the path by their sightings alone when they come again.
     closed_before = {closure.id for closure in closures if closure.accepted}
     fresh = [closure for closure in closures if closure.accepted is None]
-    binds = config.correct == "heading" and any(not closure.sd_rad for closure in fresh)
-    if closed == closed_before and not binds:
+    binds = any(closure.sd_m > MAX_VIEW_SD_M for closure in fresh)
+    if closed == closed_before and not (binds and config.correct == "heading"):
         return Answer(operations)
 
     seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP]).of_whole()
