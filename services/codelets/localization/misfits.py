@@ -93,8 +93,9 @@ def recent_percepts(
     found: Estimate, task: Task, agent: Self, graph: Graph, odometry: Floats
 ) -> list[Percept]:
     """Return what is evidence of where the agent is, in the view of `task` and before, while
-    something does not fit: everything since a landmark fitted, if the agent is lost, else that of
-    the last seconds.
+    something does not fit: everything since a landmark fitted, if the agent is lost, else the
+    landmarks that were seen whole in the last seconds. Of one that is hidden in part another part
+    is in view from the next place: several of those would fit a pose beside the true one better.
 
     By path integration alone, the agent is at `odometry` (3,).
     """
@@ -105,7 +106,8 @@ def recent_percepts(
 
     in_view = {percept.label for percept in task.percepts}
     before = seen_before(graph, odometry, since_ns)
-    return [*task.percepts, *(percept for percept in before if percept.label not in in_view)]
+    recent = [*task.percepts, *(percept for percept in before if percept.label not in in_view)]
+    return [percept for percept in recent if percept.whole or found.is_lost]
 
 
 def relocalized(

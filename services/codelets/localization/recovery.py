@@ -81,7 +81,7 @@ def seen_before(graph: Graph, odometry: Floats, since_ns: float) -> list[Percept
             range_sd_m=sd_m,
             width_m=0.0,
             height_m=0.0,
-            whole=False,
+            whole=bool(seen.whole[index]),
             box_px=(0, 0, 0, 0),
         )
         percepts.append(percept)

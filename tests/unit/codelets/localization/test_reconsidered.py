@@ -7,6 +7,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from benchmarks.localization.loop import LocalizationLoop
 from benchmarks.localization.senses import TICK_S, Moment
@@ -69,6 +70,17 @@ def test_three_landmarks_seen_in_turn_tell_where_it_is_though_one_fits_elsewhere
     believed = _believed(_turned_about_a(), _seen_in_turn("abacabacabac"))
 
     assert believed == pytest.approx(12 * STEP, abs=0.3)
+
+
+def test_landmarks_hidden_in_part_move_it_nowhere_though_all_would_fit_elsewhere() -> None:
+    start = _turned_about_a()
+    views = []
+    for percepts in _seen_in_turn("abacabacabac"):
+        views.append([replace(percept, whole=False) for percept in percepts])
+
+    believed = _believed(start, views)
+
+    assert believed[:2] == pytest.approx(compose(start, 12 * STEP)[:2], abs=0.3)
 
 
 def test_one_landmark_that_does_not_fit_moves_it_nowhere() -> None:
