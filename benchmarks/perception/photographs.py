@@ -70,7 +70,6 @@ def measure_by_drive(
     training took. Raises UsageError if torch or the encoder's weights are not installed, the
     photographs cannot be read, or are of a single drive.
     """
-    training = _training()
     image_folder, label_folder = training_folders(camvid)
     drives = by_drive(photographs(image_folder, label_folder))
     if len(drives) < 2:
@@ -79,6 +78,7 @@ def measure_by_drive(
             "what stands before the first _ of a file's name, add those of another"
         )
 
+    training = _training()
     metrics: Metrics = {}
     for number, left_out in enumerate(drives, start=1):
         announce(f"[{number}/{len(drives)}] without {left_out}, {len(drives[left_out])} images")
