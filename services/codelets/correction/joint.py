@@ -36,8 +36,8 @@ def optimize_jointly(
     alike: CORRELATED of them count as one. Points have one side, and their sightings err
     independently.
 
-    `seen` are sightings of whole landmarks: the part of one that shows at the view's border moves
-    with the agent, and would bend the path.
+    `seen` are sightings of landmarks whose extent is known: the part that shows at the view's
+    border, of one whose size nobody knows, moves with the agent, and would bend the path.
     """
     # Ranges are led from what is believed, which they have corrected before: each correction begins
     # where the last one ended.

@@ -44,6 +44,7 @@ from cogmap.schemas.nodes import (
     NEVER_NS,
     Correction,
     LoopClosure,
+    Object,
     Observations,
     PathSegment,
 )
@@ -132,7 +133,10 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     if closed == closed_before and not (binds and config.correct == "heading"):
         return Answer(operations)
 
-    seen = Sightings.of(graph.of_kind(Observations), rows[:, STAMP]).of_whole()
+    # Perception knows the sizes of buildings that it has names for.
+    sized = {node.label for node in graph.of_kind(Object) if node.look}
+    observed = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])
+    seen = observed.of_known_extent(sized)
     heard = Ranges.of(graph.of_kind(Observations), rows[:, STAMP])
     poses, replays = corrected(judgement.path, seen, heard, config)
     if config.anchor == "map":
@@ -169,7 +173,7 @@ CODELET = Codelet(
     phase=Phase.BACKGROUND,
     due=due,
     run=run,
-    reads=frozenset({PathSegment, Observations, LoopClosure}),
+    reads=frozenset({PathSegment, Observations, LoopClosure, Object}),
     writes=frozenset({LoopClosure, Correction}),
     config=Config,
     section=SECTION,

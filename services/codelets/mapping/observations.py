@@ -7,7 +7,7 @@ Corrections do not change them: they state what the agent sensed, relative to th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Container, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -160,16 +160,20 @@ class Sightings(NamedTuple):
             whole=known[:, WHOLE] > 0,
         )
 
-    def of_whole(self) -> Sightings:
-        """Choose those of landmarks that were seen whole, and these landmarks."""
-        numbers, landmark = np.unique(self.landmark[self.whole], return_inverse=True)
+    def of_known_extent(self, known: Container[str]) -> Sightings:
+        """Choose those of landmarks that were seen whole, or whose size is `known`, and these
+        landmarks.
+        """
+        is_known = np.array([label in known for label in self.labels], bool)
+        chosen = self.whole | is_known[self.landmark]
+        numbers, landmark = np.unique(self.landmark[chosen], return_inverse=True)
         return Sightings(
             labels=tuple(self.labels[number] for number in numbers.tolist()),
-            place=self.place[self.whole],
+            place=self.place[chosen],
             landmark=landmark,
-            where_m=self.where_m[self.whole],
-            information=self.information[self.whole],
-            whole=self.whole[self.whole],
+            where_m=self.where_m[chosen],
+            information=self.information[chosen],
+            whole=self.whole[chosen],
         )
 
     def weights(self, poses: Floats, landmarks_m: Floats) -> Floats:

@@ -106,18 +106,19 @@ def test_an_eye_that_sees_too_far_is_known_to() -> None:
     assert seen.where_m[0] == pytest.approx((8.0, 0.0))
 
 
-def test_sightings_of_whole_landmarks_are_told_from_those_of_a_part() -> None:
+def test_sightings_of_a_part_count_where_the_size_of_the_landmark_is_known() -> None:
     viewpoint = Viewpoint(0, 1.0, STILL, 0.0)
     part = msgspec.structs.replace(_tower(), label="barn", whole=False)
     nodes = [extended(None, viewpoint, part), extended(None, viewpoint, _tower())]
 
     seen = Sightings.of(nodes, np.array([1.0]))
-    whole = seen.of_whole()
+    whole = seen.of_known_extent(())
 
     assert seen.labels == ("barn", "tower")
     assert whole.labels == ("tower",)
     assert whole.landmark.tolist() == [0]
     assert whole.where_m == pytest.approx(seen.where_m[1:])
+    assert seen.of_known_extent({"barn"}).labels == ("barn", "tower")
 
 
 def test_a_landmark_stands_where_most_of_its_sightings_put_it() -> None:
