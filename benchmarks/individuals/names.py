@@ -8,7 +8,6 @@ import numpy as np
 
 from cogmap.cli.launch.individuals.buildings import NOTHING, Buildings
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import transform_from
 from cogmap.schemas.sensing import Percepts
 from cogmap.services.sim.public import CATALOGUE
 
@@ -22,24 +21,20 @@ def judged_names(
     """Return the activation of each percept with a taught name, and whether it is right: whether
     the building that it shows is called so. What shows no building has no right name.
     """
-    claims = []
-    points_m = []
+    judged = []
     for view in views:
         pose = pose_at.get(view.stamp_ns)
         if pose is None:
             continue
 
         for percept in view.objects:
-            if percept.name in TAUGHT:
-                direction = np.array([np.cos(percept.bearing_rad), np.sin(percept.bearing_rad)])
-                points_m.append(transform_from(pose, percept.range_m * direction[None])[0])
-                claims.append((percept.name, percept.activation))
+            if percept.name not in TAUGHT:
+                continue
 
-    shown = buildings.shown_at(np.array(points_m).reshape(-1, 2))
-    judged = []
-    for (name, activation), building in zip(claims, shown.tolist(), strict=True):
-        is_right = building != NOTHING and buildings.names[building] == name
-        judged.append((activation, is_right))
+            place = (percept.bearing_rad, percept.range_m)
+            building = buildings.shown_by(pose, place, percept.outline_px, view.calibration)
+            is_right = building != NOTHING and buildings.names[building] == percept.name
+            judged.append((percept.activation, is_right))
 
     return judged
 

@@ -60,6 +60,25 @@ class Buildings:
 
         return shown
 
+    def shown_by(
+        self,
+        pose: Floats,
+        place: tuple[float, float],
+        outline_px: Sequence[tuple[int, int]],
+        camera: Calibration | None,
+    ) -> int:
+        """Return the number of the building that a percept shows, from a robot at `pose` (3,) in
+        the world: that of most of its outline in the view, or the one at its `place`, a bearing in
+        rad and a range in m, if no camera saw it. NOTHING if there is none.
+        """
+        if camera is not None and outline_px:
+            return self.shown_in(pose, outline_px, camera)
+
+        bearing_rad, range_m = place
+        direction = np.array([np.cos(bearing_rad), np.sin(bearing_rad)])
+        (building,) = self.shown_at(transform_from(pose, range_m * direction[None])).tolist()
+        return int(building)
+
     def shown_in(
         self, pose: Floats, outline_px: Sequence[tuple[int, int]], camera: Calibration
     ) -> int:

@@ -156,24 +156,14 @@ def judge(
 def _shown(
     tally: PerceptTally, sights: Sequence[Sight], buildings: Buildings
 ) -> list[tuple[Sight, int]]:
-    """Return each of the sights from a known pose with the building that it shows: that of most of
-    its outline in the image, or the one at its place, if it was not seen by a camera.
-    """
-    poses = tally.true_poses(sights)
-    places = np.array([(sight.bearing_rad, sight.range_m) for sight in sights]).reshape(-1, 2)
-    direction_rad = poses[:, 2] + places[:, 0]
-    away_m = places[:, 1:] * np.column_stack([np.cos(direction_rad), np.sin(direction_rad)])
-    points_m = poses[:, :2] + away_m
-
+    """Return each of the sights from a known pose with the building that it shows."""
     shown = []
-    for sight, pose, point_m in zip(sights, poses, points_m, strict=True):
-        if not np.isfinite(pose).all():
-            continue
-        if sight.calibration is not None and sight.outline_px:
-            building = buildings.shown_in(pose, sight.outline_px, sight.calibration)
-        else:
-            (building,) = buildings.shown_at(point_m[None]).tolist()
-        shown.append((sight, building))
+    for sight, pose in zip(sights, tally.true_poses(sights), strict=True):
+        if np.isfinite(pose).all():
+            place = (sight.bearing_rad, sight.range_m)
+            building = buildings.shown_by(pose, place, sight.outline_px, sight.calibration)
+            shown.append((sight, building))
+
     return shown
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -14,6 +15,7 @@ from benchmarks.individuals.town import Houses, Town, Visit, visit
 from benchmarks.individuals.visitor import Plan, Visitor
 from cogmap.cli.launch.individuals.buildings import Buildings
 from cogmap.cli.launch.individuals.judge import SEEN_VIEWS, BuildingMetrics
+from cogmap.robot import calibration
 from cogmap.runtime.module import Module
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
@@ -100,6 +102,25 @@ def test_a_taught_name_is_right_if_the_building_there_has_it() -> None:
 
     assert judged == [(0.95, True), (0.92, False), (0.5, False)]
     assert sure_right_share(judged) == 0.5
+
+
+def test_a_name_is_judged_by_what_the_outline_shows_not_by_where_it_was_placed() -> None:
+    camera = calibration()
+    bakery_px = round(camera.cx_px - camera.fx_px * BAKERY_M[1] / BAKERY_M[0])
+    horizon_px = round(camera.cy_px)
+    outline_px = [
+        (bakery_px - 5, horizon_px - 10),
+        (bakery_px + 5, horizon_px - 10),
+        (bakery_px + 5, horizon_px + 5),
+        (bakery_px - 5, horizon_px + 5),
+    ]
+    beyond = percept("bakery", math.atan2(OTHER_M[1], OTHER_M[0]), math.hypot(*OTHER_M))
+    beyond = msgspec.structs.replace(beyond, outline_px=outline_px)
+    view = msgspec.structs.replace(percepts(1, beyond), calibration=camera)
+
+    ((_, is_right),) = judged_names([view], {stamp_ns(1): ORIGIN}, Buildings(TOWN))
+
+    assert is_right
 
 
 class Drive:
