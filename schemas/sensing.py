@@ -219,12 +219,14 @@ class Associations(Part, kw_only=True, frozen=True):
 
 class Learned(Message, kw_only=True, frozen=True):
     """What perception learned from one view and the broadcasts before it, or, after a restart, from
-    all before. `associations` are None if they were not published anew.
+    all before. `associations` are None if they were not published anew. `taught_share`, float64
+    (n,), is the log likelihood of shares of the buildings seen that perception was taught.
     """
 
     frame: Count
     views: list[RememberedView] = []
     associations: Associations | None = None
+    taught_share: Array | None = None
 
 
 class SpeedLimit(enum.StrEnum):

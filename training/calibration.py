@@ -79,6 +79,8 @@ def calibrate(
     cosines = embeddings @ np.asarray(prototypes.directions, np.float32).T
 
     rows = np.flatnonzero(building)
+    share = float(np.mean(column[rows] < len(columns)))
+    prototypes = msgspec.structs.replace(prototypes, taught_share=share)
     taught = Trial(cosines[rows], _none_learned(len(rows)), column[rows])
     prototypes = _likeliest(prototypes, [taught], "sharpness", "unknown")
 

@@ -179,6 +179,7 @@ def train_on_renderings(
         novel_sharpness=1.0,
         novel_unknown=0.0,
         evidence=1.0,
+        taught_share=0.5,
     )
     found = calibrate(embeddings, log_odds, held_out, prototypes)
 

@@ -100,7 +100,7 @@ class Perception:
         # The features are found beside the objects.
         shows_place = descriptor.shows_place(arrays.image, arrays.depth_m)
         features = self._backbone.begin(arrays.image) if shows_place else None
-        perceived = self._pam.perceive(arrays, view.calibration, prior)
+        perceived = self._pam.perceive(arrays, view.calibration, prior, learning=learning)
         code = None if features is None else descriptor.code(features.features())
         matches, remembered = self._places.observe(view.frame, view.stamp_ns, code, learning)
         percepts = Percepts(
@@ -121,6 +121,7 @@ class Perception:
             frame=view.frame,
             views=remembered,
             associations=associations,
+            taught_share=self._pam.taught_share.published(),
         )
         return [self._last_learned, percepts]
 
@@ -130,6 +131,8 @@ class Perception:
             if isinstance(message, Learned):
                 self._last_learned = message
                 self._places.restore(message.views)
+                if message.taught_share is not None:
+                    self._pam.taught_share.restore(message.taught_share)
                 if message.associations is not None:
                     self._primer.restore(message.associations)
 
@@ -141,6 +144,7 @@ class Perception:
             frame=last.frame,
             views=list(self._places.all),
             associations=self._primer.published(),
+            taught_share=self._pam.taught_share.published(),
         )
 
 

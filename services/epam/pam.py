@@ -31,6 +31,7 @@ from cogmap.services.epam.recognition.objects import (
     ObjectRecognizer,
 )
 from cogmap.services.epam.recognition.segments import Segment, Segmenter
+from cogmap.services.epam.recognition.taught_share import TaughtShare
 from cogmap.services.epam.recognition.walls import MAX_RANGE_M, Walls, walls
 from cogmap.services.epam.view import ViewArrays
 
@@ -80,7 +81,7 @@ class Standing(NamedTuple):
 
 
 class ExtendedPam:
-    """The PAM nodes that were taught."""
+    """The PAM nodes that were taught, and how many of the buildings seen so far they stand for."""
 
     def __init__(
         self,
@@ -93,11 +94,19 @@ class ExtendedPam:
         self._segmenter = segmenter
         self._recognizer = recognizer
         self._road_segmenter = road_segmenter
+        self.taught_share = TaughtShare(recognizer.taught_share)
 
     def perceive(
-        self, view: ViewArrays, camera: Calibration, prior: Prior = NOTHING_EXPECTED
+        self,
+        view: ViewArrays,
+        camera: Calibration,
+        prior: Prior = NOTHING_EXPECTED,
+        *,
+        learning: bool = True,
     ) -> Perceived:
-        """Return what is recognized in `view`, given what was expected by `prior`."""
+        """Return what is recognized in `view`, given what was expected by `prior`. Its buildings
+        count for the share that was taught, if it is `learning`.
+        """
         road = self._road_segmenter.begin(view.image)
         standing = self._standing(view, camera)
 
@@ -105,6 +114,8 @@ class ExtendedPam:
         road_m, road_boundary_m = project(likelihood, view.depth_m, camera)
 
         candidates = self._recognizable(standing)
+        if learning:
+            self.taught_share.add(candidate.recognition for candidate in candidates)
         found = self._found(candidates, view, prior)
         return Perceived(self._percepts(found, camera), road_m, road_boundary_m)
 
@@ -172,7 +183,8 @@ class ExtendedPam:
         """Recognize `candidate` given what is expected."""
         log_prior = prior.log_ratio(self._recognizer.labels)
         appearance = candidate.recognition.appearance
-        recognition = self._recognizer.recognize(appearance, log_prior)
+        log_taught = self.taught_share.log_ratio
+        recognition = self._recognizer.recognize(appearance, log_prior, log_taught)
         return replace(candidate, recognition=recognition)
 
     def _percepts(self, found: list[Candidate], camera: Calibration) -> list[Percept]:

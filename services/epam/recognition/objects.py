@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from concurrent.futures import Future
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import msgspec
 import numpy as np
@@ -49,7 +49,8 @@ class Prototypes(
     building is as likely that as an unknown one, and log odds rise by `sharpness` with the cosine;
     `novel_unknown` and `novel_sharpness` are those of objects learned from one encounter. The
     network's log odds that a segment shows a building, or most of one, are multiplied by
-    `evidence`. `size_m` (n, 3) are the longer and the shorter side of the footprint, and the
+    `evidence`. Of the buildings that these constants were fitted on, `taught_share` had one of the
+    `names`. `size_m` (n, 3) are the longer and the shorter side of the footprint, and the
     height.
     """
 
@@ -61,6 +62,7 @@ class Prototypes(
     novel_sharpness: float
     novel_unknown: float
     evidence: float
+    taught_share: Annotated[float, msgspec.Meta(gt=0, lt=1)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +87,9 @@ class EmbeddingPass(NamedTuple):
 class Recognition:
     """The likeliest `label` with its posterior `activation`, which is with the prior.
 
-    As far as the view alone goes, `evidence` is the posterior of the label, beside the
-    probabilities of an `unknown` building and of `background`; `names` are those of all labels.
+    As far as the view alone goes, in a drive with so many taught buildings, `evidence` is the
+    posterior of the label, beside the probabilities of an `unknown` building and of `background`;
+    `names` are those of all labels.
     `size_m` is None unless the label has more evidence than those two.
     """
 
@@ -148,14 +151,27 @@ class ObjectRecognizer:
         """Return all labels that a segment may be recognized as."""
         return self._prototypes.names
 
-    def recognize(self, appearance: Appearance, log_prior: Floats | float = 0.0) -> Recognition:
+    @property
+    def taught_share(self) -> float:
+        """Return the share of the buildings calibrated on that had one of `labels`."""
+        return self._prototypes.taught_share
+
+    def recognize(
+        self,
+        appearance: Appearance,
+        log_prior: Floats | float = 0.0,
+        log_taught: float = 0.0,
+    ) -> Recognition:
         """Return the recognition of a segment with this `appearance`.
 
         `log_prior`: how much likelier each of `labels` was before the view, as a logarithm.
+        `log_taught`: how much likelier all of them are in this drive than where they were
+        calibrated, which counts as evidence.
         """
         labels = self.labels
         none = np.empty(0, np.float32)
-        possible = _log_odds(self._directions @ appearance.embedding, none, self._prototypes)
+        cosines = self._directions @ appearance.embedding
+        possible = _log_odds(cosines, none, self._prototypes) + log_taught
 
         *seen, unknown, background = _posteriors(possible, appearance.building).tolist()
         expected = _posteriors(possible + log_prior, appearance.building)

@@ -40,6 +40,7 @@ PROTOTYPES = Prototypes(
     novel_sharpness=20.0,
     novel_unknown=0.4,
     evidence=1.0,
+    taught_share=0.5,
 )
 
 
@@ -71,6 +72,20 @@ def test_a_building_that_was_not_taught_is_unknown_and_has_no_size(
     assert not found.known
     assert found.size_m is None
     assert found.unknown > 0.9
+
+
+def test_what_looks_like_a_taught_object_is_one_less_often_among_strangers(
+    recognizer: ObjectRecognizer,
+) -> None:
+    look = _appearance(1, 5, 0.45)
+    calibrated = recognizer.recognize(look)
+    among_strangers = recognizer.recognize(look, log_taught=-4.0)
+
+    ratio = np.exp(-4.0)
+    odds = calibrated.evidence / calibrated.unknown
+    assert calibrated.known
+    assert among_strangers.evidence / among_strangers.unknown == pytest.approx(ratio * odds)
+    assert among_strangers.activation == among_strangers.evidence < calibrated.evidence
 
 
 def test_the_names_of_a_building_are_as_likely_as_it_looks_like_each(

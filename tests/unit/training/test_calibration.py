@@ -38,6 +38,7 @@ def _calibrated(noise: float, seed: int = 0, count: int = 1500) -> Calibrated:
         novel_sharpness=1.0,
         novel_unknown=0.0,
         evidence=1.0,
+        taught_share=0.5,
     )
     return calibrate(embeddings.astype(np.float32), log_odds.astype(np.float32), crops, prototypes)
 
