@@ -211,6 +211,15 @@ def _report(
         print_json(Picture(str(path), topic.name, number, frame.stamp_ns, frame.at_s, objects))
         return
 
-    shown = "" if objects is None else f", with {', '.join(objects) or 'nothing recognised'}"
+    shown = "" if objects is None else f", with {_listed(objects)}"
     place = f"frame {frame.number} at {frame.at_s:.3f} s of {log}"
     click.echo(f"{path}: {topic.name}, {place}{shown}")
+
+
+def _listed(names: list[str]) -> str:
+    """Write the names of what was recognized; what has none is counted."""
+    words = [name for name in names if name]
+    strangers = len(names) - len(words)
+    if strangers:
+        words.append(f"{strangers} without a name")
+    return ", ".join(words) or "nothing recognised"

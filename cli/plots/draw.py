@@ -119,20 +119,24 @@ def draw_objects(axes: Axes, objects: list[Percept], opacity: float) -> None:
 
 
 def name_objects(axes: Axes, objects: list[Percept], size: float) -> None:
-    """Write each object's name, its activation and its distance. The layout must be settled."""
+    """Write each object's name, if it has one, its activation and its distance. The layout must be
+    settled.
+    """
     labels = []
     for percept, colour in zip(objects, colours_of(objects), strict=True):
         corners = outline_px(percept)
         x = float(corners[:, 0].min() + corners[:, 0].max()) / 2
         y = float(corners[:, 1].min())
-        text = f"{spoken(percept.name)}\n{percept.activation:.2f} · {percept.range_m:.1f} m"
+        text = f"{percept.activation:.2f} · {percept.range_m:.1f} m"
+        if percept.name:
+            text = f"{spoken(percept.name)}\n{text}"
         labels.append(Label(text, x, y, colour))
     place(axes, labels, size, chips=True)
 
 
 def spoken(name: str) -> str:
-    """Write a name as people do; what has none is unknown."""
-    return name.replace("_", " ") or "unknown"
+    """Write a name as people do."""
+    return name.replace("_", " ")
 
 
 def outline_px(percept: Percept) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.patches import Circle, Ellipse, Polygon
 
 from cogmap.cli.plots.draw import colours_of, spoken
@@ -25,6 +25,8 @@ MARGIN_M = 3.0
 RING_M = 10.0
 MAX_ABOVE_M = 2.0
 ROBOT_PER_M = 40.0
+# Longer ellipses are fainter: they cover much of the plan.
+FAINTER_M = 12.0
 FINER = 4
 _SHIFT = 4
 
@@ -98,16 +100,14 @@ def draw_plan(axes: Axes, percepts: Percepts, camera: Calibration) -> None:
         along_m = 4 * percept.range_sd_m
         turn = math.degrees(percept.bearing_rad)
         axes.plot([0, middle[0]], [0, middle[1]], color=colour, lw=0.7, alpha=0.55, zorder=2)
-        axes.add_patch(
-            Ellipse(middle.tolist(), across_m, along_m, angle=turn, fc=colour, alpha=0.25, zorder=5)
-        )
+        opacity = 0.25 * FAINTER_M / max(along_m, FAINTER_M)
         axes.add_patch(
             Ellipse(
                 middle.tolist(),
                 across_m,
                 along_m,
                 angle=turn,
-                fill=False,
+                fc=to_rgba(colour, opacity),
                 ec=colour,
                 lw=1.2,
                 zorder=6,
@@ -137,6 +137,9 @@ def name_in_plan(axes: Axes, objects: list[Percept], size: float) -> None:
     """Write the names of the objects in the plan. Layout and limits must be settled."""
     labels = []
     for percept, colour in zip(objects, colours_of(objects), strict=True):
+        if not percept.name:
+            continue
+
         x, y = _from_above(_position_m(percept)[None])[0].tolist()
         labels.append(
             Label(spoken(percept.name), x, y + min(2 * percept.range_sd_m, MAX_ABOVE_M), colour)
@@ -157,7 +160,5 @@ def _from_above(robot_m: Floats) -> Floats:
 
 def _farthest_m(percepts: Percepts) -> float:
     road_m: list[float] = points(percepts.road_m)[:, 0].tolist()
-    objects_m = [
-        float(_position_m(percept)[0]) + 2 * percept.range_sd_m for percept in percepts.objects
-    ]
+    objects_m = [float(_position_m(percept)[0]) for percept in percepts.objects]
     return max([*road_m, *objects_m, MIN_AHEAD_M]) + MARGIN_M

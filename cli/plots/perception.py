@@ -23,7 +23,10 @@ from cogmap.schemas.sensing import Percepts, View
 PALER = 0.55
 # Without the time of day in it, the same log gives the same bytes.
 _UNDATED: dict[str, dict[str, Any]] = {".pdf": {"CreationDate": None}}
+# A view that is wider than so many times its height is shown larger: the four are below each other.
+WIDE = 2.0
 MOSAIC: Any = [["camera", "depth", "plan"], ["segments", "road", "plan"]]
+WIDE_MOSAIC: Any = [["camera", "plan"], ["depth", "plan"], ["segments", "plan"], ["road", "plan"]]
 
 
 def figure(
@@ -32,8 +35,13 @@ def figure(
     """Draw the figure, as a file of the kind that `suffix` names."""
     with mpl.rc_context(draw.STYLE):
         layout = ConstrainedLayoutEngine(h_pad=0.08, w_pad=0.05)
-        sheet = Figure(figsize=(13, 7.3), dpi=130, facecolor=PAPER, layout=layout)
-        panels = sheet.subplot_mosaic(MOSAIC, width_ratios=[1, 1, 0.92])
+        height_px, width_px = image.shape[:2]
+        is_wide = width_px > WIDE * height_px
+        size_in = (13.0, 9.4) if is_wide else (13.0, 7.3)
+        sheet = Figure(figsize=size_in, dpi=130, facecolor=PAPER, layout=layout)
+        mosaic = WIDE_MOSAIC if is_wide else MOSAIC
+        ratios = [1.15, 0.92] if is_wide else [1, 1, 0.92]
+        panels = sheet.subplot_mosaic(mosaic, width_ratios=ratios)
         draw.show(panels["camera"], image)
         shown = draw.show_depth(panels["depth"], depth_m, view.calibration)
         draw.add_scale(panels["depth"].inset_axes((1.02, 0.0, 0.035, 0.9)), shown)
@@ -68,7 +76,7 @@ def _dress(sheet: Figure, panels: dict[str, Axes], percepts: Percepts, title: st
     captions = {
         "camera": "camera image" + "".join(places),
         "depth": "depth",
-        "segments": "segments with names",
+        "segments": "segments: name, activation, distance",
         "road": "road in the image",
         "plan": "road and objects on the ground",
     }

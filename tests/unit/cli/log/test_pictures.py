@@ -132,6 +132,29 @@ def test_an_image_has_the_pixels_of_the_view_one_for_one(drive: Path) -> None:
     assert np.array_equal(read("drive-frame-4-view.png"), shade(4))
 
 
+def test_what_has_no_name_is_counted_and_shown_without_one(tmp_path: Path) -> None:
+    strangers = [msgspec.structs.replace(percept(number), name="") for number in range(2)]
+    seen = msgspec.structs.replace(answer(5), objects=[percept(0), *strangers])
+    log = write(tmp_path / "strangers.mcap", [view(5), seen])
+
+    printed = log_command("perception", log, "-o", "figure.png").stdout
+
+    assert printed.endswith("with town_hall_0, 2 without a name\n")
+
+
+def test_the_pictures_of_a_wide_camera_stand_below_each_other(tmp_path: Path) -> None:
+    wide = msgspec.structs.replace(CAMERA, height_px=100, cy_px=50.0)
+    cut = msgspec.structs.replace(
+        view(4, shade(4)[:100]), depth_m=Array.of(DEPTH_M[:100]), calibration=wide
+    )
+    log = write(tmp_path / "wide.mcap", [cut, answer(4)])
+
+    log_command("perception", log, "-o", "figure.png")
+
+    height_px, _, _ = read("figure.png").shape
+    assert height_px > 949
+
+
 def test_a_grey_camera_is_shown_in_grey(tmp_path: Path) -> None:
     grey = np.ascontiguousarray(SCENE[..., 0])
     pair = StereoFrame(
