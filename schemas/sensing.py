@@ -112,7 +112,7 @@ class Percept(Part, kw_only=True, frozen=True):
     seen from the robot.
 
     `name` is the likeliest name, empty if it has none, as a tree trunk; `activation` is the total
-    activation of its PAM node, `evidence` how likely the view alone makes it, whatever was
+    activation of its PAM node, `evidence` how likely the views make it, whatever was
     expected, and `names` how likely it makes other names. `label` is that of the individual object
     that it is of, and `certainty` how likely it is of that one: the workspace finds it, unless what
     perceives knows it, as by a barcode.

@@ -79,7 +79,9 @@ def calibrate(
     cosines = embeddings @ np.asarray(prototypes.directions, np.float32).T
 
     rows = np.flatnonzero(building)
-    share = float(np.mean(column[rows] < len(columns)))
+    # As if one of each had been there besides: a trial's few towns may have no strangers at all.
+    taught_rows = int(np.count_nonzero(column[rows] < len(columns)))
+    share = (taught_rows + 1) / (len(rows) + 2)
     prototypes = msgspec.structs.replace(prototypes, taught_share=share)
     taught = Trial(cosines[rows], _none_learned(len(rows)), column[rows])
     prototypes = _likeliest(prototypes, [taught], "sharpness", "unknown")
@@ -140,7 +142,8 @@ def _metrics(posterior: Floats, of: Crops, column: Rows) -> dict[str, float]:
 
 
 def _share(of: Booleans) -> float:
-    return float(of.mean())
+    """Return the share that is true, NaN of none."""
+    return float(of.mean()) if of.size else float("nan")
 
 
 def _accuracy(prototypes: Prototypes, trials: Iterable[Trial]) -> float:

@@ -50,8 +50,7 @@ class Prototypes(
     `novel_unknown` and `novel_sharpness` are those of objects learned from one encounter. The
     network's log odds that a segment shows a building, or most of one, are multiplied by
     `evidence`. Of the buildings that these constants were fitted on, `taught_share` had one of the
-    `names`. `size_m` (n, 3) are the longer and the shorter side of the footprint, and the
-    height.
+    `names`. `size_m` (n, 3) are the longer and the shorter side of the footprint, and the height.
     """
 
     names: list[str]
@@ -87,10 +86,10 @@ class EmbeddingPass(NamedTuple):
 class Recognition:
     """The likeliest `label` with its posterior `activation`, which is with the prior.
 
-    As far as the view alone goes, in a drive with so many taught buildings, `evidence` is the
-    posterior of the label, beside the probabilities of an `unknown` building and of `background`;
-    `names` are those of all labels.
-    `size_m` is None unless the label has more evidence than those two.
+    Without that prior, by the view and the share of taught buildings in the drive, `evidence` is
+    the posterior of the label, beside the probabilities of an `unknown` building and of
+    `background`; `names` are those of all labels. `size_m` is None unless the label has more
+    evidence than those two.
     """
 
     label: str
@@ -104,8 +103,8 @@ class Recognition:
 
     @property
     def known(self) -> bool:
-        """Return whether the label is likelier than an unknown building and background together, as
-        far as the view alone goes.
+        """Return whether the label is likelier than an unknown building and background together,
+        without the prior.
         """
         return self.evidence > self.unknown + self.background
 

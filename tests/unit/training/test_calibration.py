@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -13,10 +15,12 @@ TAUGHT = ["bakery", "bank", "cafe"]
 NOVEL = [f"invented-9-{number}" for number in range(6)]
 
 
-def _calibrated(noise: float, seed: int = 0, count: int = 1500) -> Calibrated:
+def _calibrated(
+    noise: float, seed: int = 0, count: int = 1500, novel: Sequence[str] = NOVEL
+) -> Calibrated:
     """Calibration on segments whose embeddings have this much `noise`; a fifth show no building."""
     rng = np.random.default_rng(seed)
-    directions = _unit(rng.normal(size=(len(TAUGHT) + len(NOVEL), DIMENSIONS)))
+    directions = _unit(rng.normal(size=(len(TAUGHT) + len(novel), DIMENSIONS)))
     which = rng.integers(len(directions), size=count)
     embeddings = _unit(directions[which] + noise * rng.normal(size=(count, DIMENSIONS)))
 
@@ -24,7 +28,7 @@ def _calibrated(noise: float, seed: int = 0, count: int = 1500) -> Calibrated:
     log_odds = np.where(background, -1.0, 1.0)[:, None] * 8.0 + rng.normal(size=(count, 2)) * 8.0
     crops = Crops(
         values=np.empty((count, 0), np.float16),
-        name=np.where(background, "", np.array([*TAUGHT, *NOVEL])[which]),
+        name=np.where(background, "", np.array([*TAUGHT, *novel])[which]),
         whole=~background,
         view=np.arange(count),
         area_px=rng.integers(100, 9000, count),
@@ -85,3 +89,13 @@ def test_calibration_error_is_the_gap_between_activation_and_accuracy() -> None:
     assert calibration_error(guessing, correct) == pytest.approx(0.0)
     assert calibration_error(too_sure, correct) == pytest.approx(0.4)
     assert calibration_error(knowing, correct) == pytest.approx(0.01)
+
+
+def test_the_share_of_taught_buildings_is_that_of_those_calibrated_on() -> None:
+    found = _calibrated(noise=0.05).prototypes.taught_share
+
+    assert found == pytest.approx(len(TAUGHT) / (len(TAUGHT) + len(NOVEL)), abs=0.05)
+
+
+def test_where_no_stranger_was_seen_there_still_may_be_one() -> None:
+    assert 0.99 < _calibrated(noise=0.05, novel=[]).prototypes.taught_share < 1.0
