@@ -7,7 +7,6 @@ import os
 import signal
 import sys
 import threading
-import time
 from pathlib import Path
 from types import FrameType
 
@@ -25,8 +24,8 @@ log = logging.getLogger("cogmap")
 IDLE_S = 0.25
 # Added to the niceness, which ends at 19.
 PATIENT = 10
-# To end by itself after its launcher has ended, which would have waited as long.
-ORPHAN_GRACE_S = 10.0
+# To end in order; whoever started it would wait as long.
+END_GRACE_S = 10.0
 
 
 class Stop:
@@ -66,8 +65,7 @@ class Stop:
         while os.read(sys.stdin.fileno(), 4096):
             pass
         self._asked.set()
-        time.sleep(ORPHAN_GRACE_S)
-        os._exit(1)  # it hangs, and nobody is left to end it
+        _end_by_force()
 
 
 def await_line() -> bool:
@@ -131,5 +129,16 @@ def run_router(endpoint: str, stop: Stop) -> None:
     """Run a router until `stop` is asked. Raises PortInUseError."""
     session = open_router(endpoint)
     log.info("router listens at %s", endpoint)
-    stop.wait()
+    while not stop.wait(IDLE_S):  # without a time limit, a signal that comes before it is not seen
+        pass
+    _end_by_force()
     session.close()  # type: ignore[no-untyped-call]
+
+
+def _end_by_force() -> None:
+    """End this process after a while if something hangs, as closing a session may while others
+    leave it: nobody may be left to end it.
+    """
+    timer = threading.Timer(END_GRACE_S, os._exit, [1])
+    timer.daemon = True
+    timer.start()
