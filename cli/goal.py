@@ -204,13 +204,19 @@ def _number(word: str) -> float | None:
 
 
 def read_goals(path: Path) -> list[Goal]:
-    """Read the goals of a file, one a line. Raises UsageError for a wrong line, which it names, and
-    if there is none.
+    """Read the goals of a file, one a line: a name, which may have several words, or x and y.
+
+    Raises UsageError for a wrong line, which it names, and if there is none.
     """
     goals = []
     for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1):
+        words = line.split()
+        if not words:
+            continue
+
         try:
-            goals += parsed(line.split())
+            is_position = _number(words[0]) is not None
+            goals += parsed(words if is_position else [" ".join(words)])
         except UsageError as error:
             raise UsageError(f"{path}, line {number}: {error}") from None
 

@@ -63,6 +63,13 @@ def test_a_file_has_a_goal_a_line(tmp_path: Path) -> None:
     assert [goal.id for goal in read_goals(path)] == [goal_id("bakery"), goal_id("3,4")]
 
 
+def test_a_name_of_several_words_is_one_goal_of_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "goals.txt"
+    path.write_text("our school\n3 4\n", "utf-8")
+
+    assert [goal.id for goal in read_goals(path)] == [goal_id("our school"), goal_id("3,4")]
+
+
 def test_a_file_without_goals_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "goals.txt"
     path.write_text("\n \n", "utf-8")
