@@ -7,6 +7,7 @@ the town is: in the workspace. A percept says what its view shows.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -15,7 +16,7 @@ from cogmap.schemas.sensing import Calibration, Percept
 from cogmap.services.epam.association.prior import NOTHING_EXPECTED, Prior
 from cogmap.services.epam.association.relations import NamedObject, beside
 from cogmap.services.epam.config import Config
-from cogmap.services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
+from cogmap.services.epam.layout.footprint_fit import ObjectPose, locate
 from cogmap.services.epam.layout.ground import project
 from cogmap.services.epam.layout.road import RoadSegmenter
 from cogmap.services.epam.recognition.candidate import (
@@ -45,7 +46,7 @@ MIN_EVIDENCE = 0.02
 # standard deviations; and that of sides that were taught.
 USUAL_SIDES_M = (9.5, 9.5)
 USUAL_SIDES_SD_M = (2.2, 2.2)
-KNOWN_SD_M = 0.02
+TAUGHT_SIDES_SD_M = (0.02, 0.02)
 # Beside the fit's own: the shape is not known to be a rectangle, nor an end to be the object's.
 UNKNOWN_SHAPE_SD_M = 0.7
 # A footprint whose sides were taught and that fits worse, in standard deviations, is of another
@@ -230,29 +231,22 @@ def _poses(found: list[Candidate], camera: Calibration) -> list[ObjectPose]:
     """Place each candidate by its known footprint if that fits what is seen, else by one of about
     the usual size, and by its walls alone if no true end of it is seen.
     """
-    poses: dict[int, ObjectPose] = {}
     bounded = [
         number
         for number, candidate in enumerate(found)
         if candidate.walls.left_true or candidate.walls.right_true
     ]
-    taught: list[int] = []
-    silhouettes: list[Silhouette] = []
+    taught_m = {}
     for number in bounded:
         size_m = found[number].recognition.size_m
         if size_m is not None:
-            sides_sd_m = (KNOWN_SD_M, KNOWN_SD_M)
-            silhouettes.append(found[number].walls.silhouette(size_m[:2], sides_sd_m))
-            taught.append(number)
-    for number, pose in zip(taught, locate(silhouettes, camera), strict=True):
-        if pose.misfit <= MAX_MISFIT:
-            poses[number] = pose
+            taught_m[number] = size_m[:2]
 
-    usual = [number for number in bounded if number not in poses]
-    silhouettes = [
-        found[number].walls.silhouette(USUAL_SIDES_M, USUAL_SIDES_SD_M) for number in usual
-    ]
-    for number, pose in zip(usual, locate(silhouettes, camera), strict=True):
+    taught = _fitted(found, taught_m, TAUGHT_SIDES_SD_M, camera)
+    poses = {number: pose for number, pose in taught.items() if pose.misfit <= MAX_MISFIT}
+
+    usual_m = {number: USUAL_SIDES_M for number in bounded if number not in poses}
+    for number, pose in _fitted(found, usual_m, USUAL_SIDES_SD_M, camera).items():
         fitted = pose.widened(max(1.0, pose.misfit)).blurred(UNKNOWN_SHAPE_SD_M)
         if fitted.range_m > MAX_RANGE_M or fitted.sd_m > MAX_SD_SHARE * fitted.range_m:
             fitted = found[number].walls.usual_pose(camera).widened(UNFITTED_WIDER)
@@ -262,6 +256,19 @@ def _poses(found: list[Candidate], camera: Calibration) -> list[ObjectPose]:
         poses[number] if number in poses else candidate.walls.usual_pose(camera)
         for number, candidate in enumerate(found)
     ]
+
+
+def _fitted(
+    found: list[Candidate],
+    sides_m: Mapping[int, tuple[float, float]],
+    sides_sd_m: tuple[float, float],
+    camera: Calibration,
+) -> dict[int, ObjectPose]:
+    """Fit footprints of these sides to some of the candidates, by their number."""
+    silhouettes = [
+        found[number].walls.silhouette(each_m, sides_sd_m) for number, each_m in sides_m.items()
+    ]
+    return dict(zip(sides_m, locate(silhouettes, camera), strict=True))
 
 
 def _is_piece(candidate: Candidate, whole: Candidate) -> bool:
