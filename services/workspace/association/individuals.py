@@ -163,8 +163,8 @@ class Individuals:
             likenesses = np.array([P_SEEN * likeness(percept, node) for node in nodes])
             one = Possible(
                 percept=percept,
-                objects=nodes,
-                own_m2=[node.covariance_m2() for node in nodes],
+                places_m=np.array([(node.x_m, node.y_m) for node in nodes]).reshape(-1, 2),
+                own_m2=np.array([node.covariance_m2() for node in nodes]).reshape(-1, 2, 2),
                 numbers=np.array([number_of[node.label] for node in nodes], np.int64),
                 log_likeness=np.log(likenesses),
                 log_none=math.log((NEW_PER_VIEW + MISTAKES_PER_VIEW) * look.of_another),

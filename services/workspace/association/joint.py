@@ -16,7 +16,6 @@ import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import wrap_angle
-from cogmap.schemas.nodes import Object
 from cogmap.schemas.sensing import Percept
 
 BEAM = 32
@@ -57,14 +56,14 @@ class Belief(NamedTuple):
 
 
 class Possible(NamedTuple):
-    """A percept, the objects that it may be of, m of them, with the covariances of where these
-    stand (m, 2, 2), by number (m,), with the logarithm of how much likelier it looks so if it is of
-    each than of any, (m,), and that of how likely it is of none of them.
+    """A percept, and the m objects that it may be of: where they stand (m, 2), with the covariances
+    of that (m, 2, 2), their numbers (m,), the logarithm of how much likelier it looks so if it is
+    of each than of any, (m,), and that of how likely it is of none of them.
     """
 
     percept: Percept
-    objects: Sequence[Object]
-    own_m2: Sequence[Floats]
+    places_m: Floats
+    own_m2: Floats
     numbers: Indices
     log_likeness: Floats
     log_none: float
@@ -85,28 +84,30 @@ def associate(percepts: Sequence[Possible], belief: Belief) -> Association:
     chosen = np.zeros((len(belief.means), 0), np.int64)
 
     # The percepts that are told best come first: a wrong beginning is seen early.
-    order = sorted(range(len(percepts)), key=lambda number: len(percepts[number].objects))
+    order = sorted(range(len(percepts)), key=lambda number: len(percepts[number].numbers))
     for number in order:
         possible = percepts[number]
-        count = len(chosen)
         stays = belief._replace(log_weights=belief.log_weights + possible.log_none)
-        parts = [stays]
-        together = [np.column_stack([chosen, np.full(count, NONE)])]
-        for place, (node, own_m2) in enumerate(zip(possible.objects, possible.own_m2, strict=True)):
-            is_free = ~(chosen == possible.numbers[place]).any(axis=1)
-            before = belief.take(np.flatnonzero(is_free))
-            after = seen(before, possible.percept, node, own_m2)
-            log_weights = after.log_weights + possible.log_likeness[place]
-            parts.append(after._replace(log_weights=log_weights))
-            added = np.full(len(before.means), possible.numbers[place])
-            together.append(np.column_stack([chosen[is_free], added]))
 
-        means, covariances, log_weights = (
-            np.concatenate(each) for each in zip(*parts, strict=True)
+        # Each object with each association that has not given it to another percept.
+        is_taken = (chosen == possible.numbers[:, None, None]).any(axis=2)
+        which, rows = np.nonzero(~is_taken)
+        after = seen(
+            belief.take(rows), possible.percept, possible.places_m[which], possible.own_m2[which]
         )
+        log_weights = after.log_weights + possible.log_likeness[which]
+
+        log_weights = np.concatenate([stays.log_weights, log_weights])
         best = np.argsort(-log_weights, kind="stable")[:BEAM]
-        belief = Belief(means, covariances, log_weights).take(best)
-        chosen = np.concatenate(together)[best]
+        belief = Belief(
+            means=np.concatenate([stays.means, after.means])[best],
+            covariances=np.concatenate([stays.covariances, after.covariances])[best],
+            log_weights=log_weights[best],
+        )
+        every = np.arange(len(chosen))
+        given = np.concatenate([np.full(len(chosen), NONE), possible.numbers[which]])
+        before = np.concatenate([every, rows])
+        chosen = np.column_stack([chosen[before[best]], given[best]])
 
     highest = belief.log_weights.max()
     shares = np.exp(belief.log_weights - highest)
@@ -124,12 +125,12 @@ def associate(percepts: Sequence[Possible], belief: Belief) -> Association:
     return Association(objects, probability, log_evidence)
 
 
-def seen(belief: Belief, percept: Percept, node: Object, own_m2: Floats) -> Belief:
-    """Return the belief once a percept is taken to be of an object, which stands where it does with
-    the covariance `own_m2`, (2, 2). Its weights are multiplied by how much likelier the percept is
-    then seen where it is than anything anywhere in view.
+def seen(belief: Belief, percept: Percept, places_m: Floats, own_m2: Floats) -> Belief:
+    """Return each of the belief's h distributions once a percept is taken to be of an object, which
+    stands at (h, 2) `places_m` with the covariances `own_m2`, (h, 2, 2). Its weights are multiplied
+    by how much likelier the percept is then seen where it is than anything anywhere in view.
     """
-    offset_m = np.array([node.x_m, node.y_m]) - belief.means[:, :2]
+    offset_m = places_m - belief.means[:, :2]
     distance_m = np.hypot(offset_m[:, 0], offset_m[:, 1]).clip(MIN_DISTANCE_M)
     towards = offset_m / distance_m[:, None]
 
