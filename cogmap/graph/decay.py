@@ -56,7 +56,12 @@ def cycle_of_forgetting(node: GraphNode, decay: Decay) -> int:
         total = total_activation(node, node.cycle + age, decay)
         return total < decay.forget_below
 
-    age = bisect_left(range(_MAX_AGE), True, lo=1, key=is_below)
-    if age == _MAX_AGE:
-        return NEVER
+    # Most are forgotten soon.
+    beyond = 2
+    while not is_below(beyond):
+        if beyond == _MAX_AGE:
+            return NEVER
+        beyond *= 2
+
+    age = bisect_left(range(_MAX_AGE), True, lo=beyond // 2, hi=beyond, key=is_below)
     return node.cycle + age - 1
