@@ -92,7 +92,7 @@ def measure(setting: Setting, *, towns: int = TOWNS) -> Metrics:
     Towns of several blocks at the level of percepts, the modules on the in-memory bus. Then ten
     goals a town, half of them with a street of the planned route closed on the way. The first town
     is also explored with cameras; its figures are beside the others, with `cameras` before them.
-    Takes three quarters of an hour on two cores.
+    Takes over an hour on two cores.
     """
     visits = [Visit(FIRST_SEED, True, EXPLORE_S, GOALS)]
     for seed in range(FIRST_SEED, FIRST_SEED + towns):
