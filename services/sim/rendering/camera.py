@@ -12,6 +12,7 @@ import numpy.typing as npt
 from cogmap.geometry.arrays import Floats, Singles
 from cogmap.schemas.array import Array
 from cogmap.schemas.sensing import Calibration, StereoFrame
+from cogmap.services.sim.rendering import shadow_map
 from cogmap.services.sim.rendering.light import Light, brightness, expose, shadow_top
 from cogmap.services.sim.rendering.wall import Image
 from cogmap.services.sim.stdio import pybullet, quiet
@@ -58,6 +59,8 @@ class StereoCamera:
         # The first images take long, and EGL announces them.
         with quiet():
             self.capture()
+        if world.egl is not None:
+            shadow_map.shrink()
 
     def capture(self) -> tuple[Image, Image]:
         """Render the left and the right image from where the robot is."""

@@ -17,6 +17,7 @@ from cogmap.robot import TRACK_M, WHEEL_RADIUS_M, calibration
 from cogmap.schemas.sensing import Calibration, Pose
 from cogmap.services.sim.layout import town
 from cogmap.services.sim.layout.plan import Plot
+from cogmap.services.sim.rendering import shadow_map
 from cogmap.services.sim.rendering.camera import Exposure, StereoCamera
 from cogmap.services.sim.world import World
 from cogmap.training.rendering import towns
@@ -165,6 +166,14 @@ def test_a_second_world_rendered_by_egl_is_refused_while_one_is_open(world: Worl
 
     with pytest.raises(CogmapError, match="close it"):
         World(world.town)
+
+
+def test_the_plugin_has_one_shadow_map_which_is_shrunk(world: World) -> None:
+    if world.egl is None:
+        pytest.skip("EGL does not work here")
+    StereoCamera(world, calibration())
+
+    assert shadow_map.shrink() == 1
 
 
 def test_pictures_asked_for_on_another_thread_are_refused(world: World) -> None:
