@@ -10,7 +10,6 @@ import msgspec
 from rich.console import Console
 
 from cogmap.bus.session import free_endpoint
-from cogmap.cli.files import LOG_NAME
 from cogmap.cli.launch.display import Display, display_on
 from cogmap.cli.launch.drive import Drive
 from cogmap.cli.launch.drive_metrics import RunMetrics
@@ -22,7 +21,7 @@ from cogmap.cli.launch.watch import Watch
 from cogmap.cli.run import summary
 from cogmap.errors import CogmapError
 from cogmap.recording.recorder import Summary
-from cogmap.recording.storage.format import SUMMARY
+from cogmap.recording.storage.format import LOG_NAME, SUMMARY
 from cogmap.recording.storage.reader import LogReader
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop

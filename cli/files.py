@@ -8,14 +8,6 @@ from pathlib import Path
 from cogmap.errors import UsageError
 from cogmap.recording.storage.writer import cannot_write
 
-LOG_NAME = "log.mcap"
-"""The name of the log in a run's folder."""
-
-
-def log_file(path: Path) -> Path:
-    """Return the log at `path`, or the one in the run's folder at `path`."""
-    return path / LOG_NAME if path.is_dir() else path
-
 
 def check_picture(option: str, path: Path, suffixes: Sequence[str]) -> None:
     """Raise UsageError if `path`, given by `option`, has none of `suffixes`, or no folder."""

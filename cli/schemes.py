@@ -6,7 +6,6 @@ from pathlib import Path
 
 import click
 
-from cogmap.cli.files import log_file
 from cogmap.errors import LogError
 from cogmap.recording.log import open_log
 from cogmap.runtime.state.new_file import new_file
@@ -37,10 +36,9 @@ def schemes(log: Path, out: Path | None) -> None:
     An agent that starts at the same place with these schemes, and without goals, drives the same
     way.
     """
-    path = log_file(log)
-    found = learned(path)
+    found = learned(log)
     if not found:
-        raise LogError(f"{path} holds no guidance schemes: record a drive to a goal past buildings")
+        raise LogError(f"{log} holds no guidance schemes: record a drive to a goal past buildings")
 
     text = written(found)
     if out is None:

@@ -16,9 +16,9 @@ from benchmarks.cognition.random_actions import RandomActions
 from benchmarks.drive import drive
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most, within
-from cogmap.cli.files import LOG_NAME
 from cogmap.cli.progress import bar
 from cogmap.parallel import parallel_map
+from cogmap.recording.storage.format import LOG_NAME
 from cogmap.recording.storage.reader import LogReader, Record
 from cogmap.schemas.topics import ACTION, BROADCAST, Topic
 

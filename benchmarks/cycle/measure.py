@@ -8,8 +8,8 @@ from benchmarks.cycle.position_error import TOWNS, over_fused
 from benchmarks.drive import drive
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
-from cogmap.cli.files import LOG_NAME
 from cogmap.recording.replaying.replay import replay_into
+from cogmap.recording.storage.format import LOG_NAME
 from cogmap.services import registry
 
 REPLAYED = ("sensory", "epam", "workspace", "codelets")

@@ -10,7 +10,7 @@ from cogmap.cli.explain import choice
 from cogmap.cli.explain.facts import facts
 from cogmap.cli.explain.moment import moment
 from cogmap.cli.explain.screen import print_moment
-from cogmap.cli.files import check_picture, log_file, save
+from cogmap.cli.files import check_picture, save
 from cogmap.cli.options import FiniteRange, json_option
 from cogmap.cli.printing import print_json
 from cogmap.recording.log import open_log
@@ -62,7 +62,7 @@ def explain(
     if picture is not None:
         check_picture("--picture", picture, PICTURES)
 
-    opened = open_log(log_file(log))
+    opened = open_log(log)
     choice.require_decisions(opened)
     if at_s is not None:
         cycle = choice.at_time(opened, at_s)

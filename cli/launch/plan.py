@@ -10,11 +10,11 @@ from typing import Any
 import msgspec
 import tomli_w
 
-from cogmap.cli.files import LOG_NAME
 from cogmap.cli.launch.command_line import cogmap_command
 from cogmap.cli.launch.goals import name_of
 from cogmap.cli.launch.supervisor import Program
 from cogmap.errors import ConfigError
+from cogmap.recording.storage.format import LOG_NAME
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
 from cogmap.schemas.nodes import Goal, goal_id

@@ -12,7 +12,6 @@ import msgspec
 from rich.markup import escape
 from rich.table import Table
 
-from cogmap.cli.files import LOG_NAME
 from cogmap.cli.launch.drive import Drive
 from cogmap.cli.launch.drive_metrics import (
     DriveMetrics,
@@ -25,6 +24,7 @@ from cogmap.cli.launch.drive_metrics import (
 )
 from cogmap.cli.launch.outcome import Ending, Outcome
 from cogmap.cli.launch.watch import Watch
+from cogmap.recording.storage.format import LOG_NAME
 
 SUMMARY_NAME = "summary.json"
 MAP_NAME = "map.png"

@@ -6,19 +6,23 @@ import json
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
 
 from cogmap.bus.codec import Envelope
 from cogmap.errors import LogError, MessageError
 from cogmap.graph.graph import Graph
-from cogmap.recording import selection
+from cogmap.recording import selection, table
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.format import MAX_TIME_NS
 from cogmap.recording.storage.reader import LogReader, Record
-from cogmap.schemas import topics as table
+from cogmap.schemas import topics as topic_table
 from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta
 from cogmap.schemas.topics import Topic
+
+if TYPE_CHECKING:
+    import pyarrow
 
 BISECTED_S = 0.5
 """A span of a log that is read as it is, not bisected any more: about a chunk."""
@@ -40,11 +44,24 @@ class Entry:
 
 
 class Log:
-    """A recorded log. Made by `open_log`; reads the file as messages are asked for."""
+    """A recorded log. Made by `open_log`; reads the file as messages are asked for, and frees the
+    memory of what it read at the end of a `with` statement.
+    """
 
     def __init__(self, reader: LogReader) -> None:
         self._reader = reader
         self._start_ns = reader.span_ns[0]
+
+    def __enter__(self) -> Log:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._reader.forget()
 
     @property
     def path(self) -> Path:
@@ -77,14 +94,14 @@ class Log:
         channels = self._reader.channels.values()
         recorded = {channel.topic for channel in channels}
 
-        names = [topic.name for topic in table.ALL]
+        names = [topic.name for topic in topic_table.ALL]
         return [name for name in names if name in recorded]
 
     def messages(
-        self, *topics: str, start_s: float = 0.0, end_s: float | None = None
+        self, *topics: str | Topic, start_s: float = 0.0, end_s: float | None = None
     ) -> Iterator[Entry]:
         """Yield messages on `topics`, on all if none is named, in the order in which they were
-        received.
+        received. A topic is named, or is one of the table: `"odometry"`, `topics.ODOMETRY`.
 
         Those from `start_s` (inclusive) to `end_s` (exclusive) into the log. Raises UsageError for
         an unknown topic; LogError if the log is damaged or a message does not fit its topic.
@@ -99,7 +116,21 @@ class Log:
                 envelope=record.envelope,
             )
 
-    def last(self, topic: str, holds: Callable[[Any], bool]) -> Entry | None:
+    def frame(
+        self, topic: str | Topic, *, start_s: float = 0.0, end_s: float | None = None
+    ) -> pyarrow.Table:
+        """Return the messages on `topic` as an Arrow table: a row a message, a column a field.
+
+        `time_s` is when each was received; the fields of a part are columns of their own, such as
+        `pose.x_m`. Its `to_pandas()` is pandas', `polars.from_arrow` makes it polars'. Those from
+        `start_s` (inclusive) to `end_s` (exclusive). Raises as `messages` does, and UsageError if
+        there is no pyarrow.
+        """
+        (chosen,) = selection.named([topic])
+        entries = self.messages(chosen, start_s=start_s, end_s=end_s)
+        return table.table(chosen.type, ((entry.time_s, entry.message) for entry in entries))
+
+    def last(self, topic: str | Topic, holds: Callable[[Any], bool]) -> Entry | None:
         """Return the last message on `topic` for which `holds` is true; None if it is for none.
 
         If `holds` is true for a message, it must be for all before, as "of cycle 9 or before" is.
@@ -130,7 +161,7 @@ class Log:
         middle of a drive.
         """
         graph = Graph()
-        for record in self._between([table.DELTA], 0.0, None):
+        for record in self._between([topic_table.DELTA], 0.0, None):
             if record.log_time_ns - self._start_ns > time_s * 1e9:
                 break
             delta = self._message(record)
@@ -163,14 +194,15 @@ class Log:
 
 
 def open_log(path: Path | str) -> Log:
-    """Open the log at `path` for reading.
+    """Open the log at `path`, or in the run's folder at `path`, for reading.
 
     Raises LogError if there is none, or it is foreign, damaged or of a version that is not read.
 
-        log = open_log("drive.mcap")
-        for entry in log.messages("odometry", start_s=2.0, end_s=4.0):
-            print(entry.time_s, entry.message.speed_m_s)
-        print(len(log.graph_at(4.0).nodes))
+        with open_log("runs/latest") as log:
+            for entry in log.messages("odometry", start_s=2.0, end_s=4.0):
+                print(entry.time_s, entry.message.speed_m_s)
+            print(log.frame("truth/pose").to_pandas())
+            print(len(log.graph_at(4.0).nodes))
     """
     return Log(LogReader(Path(path)))
 

@@ -12,12 +12,15 @@ from cogmap.schemas import topics
 from cogmap.schemas.topics import Topic
 
 
-def named(names: Iterable[str]) -> list[Topic]:
-    """Return the topics of those names. Raises UsageError naming the one that is not in the
-    table.
+def named(names: Iterable[str | Topic]) -> list[Topic]:
+    """Return the topics of those names; a topic stands for itself. Raises UsageError naming the one
+    that is not in the table.
     """
     found = []
     for name in names:
+        if isinstance(name, Topic):
+            found.append(name)
+            continue
         if name not in topics.BY_NAME:
             close = difflib.get_close_matches(name, topics.BY_NAME, 1)
             known = f"there are {', '.join(sorted(topics.BY_NAME))}"

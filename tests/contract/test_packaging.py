@@ -89,7 +89,12 @@ def test_the_library_requires_ranges_and_the_application_one_version_within_each
         assert pin.marker == ranges[name].marker, name
 
 
-def test_what_renders_or_trains_is_optional_for_the_library() -> None:
+def test_what_renders_trains_or_makes_tables_is_optional_for_the_library() -> None:
+    tables = _ranges("tables")
+    (tested,) = _pins("dev")["pyarrow"].specifier
+
+    assert tables.keys() == {"pyarrow"}
+    assert tested.version in tables["pyarrow"].specifier
     assert _ranges("rendering").keys() == {"pybullet"}
     assert _ranges("train").keys() == _pins("train").keys()
 

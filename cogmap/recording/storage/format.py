@@ -22,6 +22,9 @@ from cogmap.schemas.export import json_schema
 from cogmap.schemas.topics import Delivery, Topic
 from cogmap.version import VERSION
 
+LOG_NAME = "log.mcap"
+"""The name of the log in a run's folder."""
+
 PROFILE = ""
 SOFTWARE = f"cogmap {VERSION}"
 MESSAGE_ENCODING = "msgpack"

@@ -17,6 +17,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 
 from cogmap.errors import LogError
+from cogmap.recording.storage.format import LOG_NAME
 
 # A run of messages outside chunks is read at once: about what a chunk of ours holds.
 RUN_BYTES = 1 << 20
@@ -58,6 +59,11 @@ class LogIndex:
     metadata: list[tuple[str, dict[str, str]]] = field(default_factory=list)
     chunks: list[ChunkSpan] = field(default_factory=list)
     unreadable_bytes: int = 0
+
+
+def log_file(path: Path) -> Path:
+    """Return the log at `path`, or the one in the run's folder at `path`."""
+    return path / LOG_NAME if path.is_dir() else path
 
 
 def check_magic(path: Path) -> None:

@@ -20,6 +20,7 @@ from cogmap.recording.storage.format import EnvelopeRecord
 from cogmap.recording.storage.index import (
     DamageError,
     channels_in,
+    log_file,
     messages_in,
     read_chunk,
     read_index,
@@ -75,14 +76,15 @@ _ORDER = attrgetter("order")
 
 
 class LogReader:
-    """The log at `path`. `cut_bytes` at its end belong to no whole record: it was cut off, or is
-    being written.
+    """The log at `path`, or in the run's folder there. `cut_bytes` at its end belong to no whole
+    record: it was cut off, or is being written.
 
     Raises LogError if it is missing, foreign, of a version that is not read here, or damaged;
     damage is found when the chunk concerned is read.
     """
 
     def __init__(self, path: Path) -> None:
+        path = log_file(path)
         index = read_index(path)
         self.path = path
         self.size_bytes = path.stat().st_size
@@ -92,6 +94,10 @@ class LogReader:
         self._chunks = index.chunks
         self._cache: OrderedDict[int, list[Written]] = OrderedDict()
         check_readable(path, index.library, self.about(layout.RECORDING).get("software", ""))
+
+    def forget(self) -> None:
+        """Free the memory of what was read; it is read again when it is asked for."""
+        self._cache.clear()
 
     def about(self, name: str) -> dict[str, str]:
         """Return the last metadata record called `name`, empty if there is none."""

@@ -23,7 +23,7 @@ from mcap.records import Channel, Chunk, Header, McapRecord, Message, MessageInd
 from mcap.writer import MCAP0_MAGIC
 
 from cogmap.errors import LogError
-from cogmap.recording.storage.index import DamageError, check_magic
+from cogmap.recording.storage.index import DamageError, check_magic, log_file
 
 _HEAD = struct.Struct("<BQ")
 _COMPRESSION = re.compile(rb"\x03\x00\x00\x00lz4|\x04\x00\x00\x00zstd")
@@ -52,9 +52,12 @@ class RecordSpan:
 
 
 class LogBytes:
-    """The bytes of a log, mapped. Raises LogError if there is no file, or it is not MCAP."""
+    """The bytes of a log, or of that in a run's folder, mapped. Raises LogError if there is no
+    file, or it is not MCAP.
+    """
 
     def __init__(self, path: Path) -> None:
+        path = log_file(path)
         check_magic(path)
         try:
             with path.open("rb") as file:

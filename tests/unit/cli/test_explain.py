@@ -10,9 +10,9 @@ import pytest
 from click import UsageError as ClickUsageError
 from click.testing import CliRunner
 
-from cogmap.cli.files import LOG_NAME
 from cogmap.cli.main import cogmap
 from cogmap.errors import LogError, UsageError
+from cogmap.recording.storage.format import LOG_NAME
 from tests.support.cycles import Cycles
 from tests.support.logs import write_log
 from tests.support.reference import REFERENCE
