@@ -27,6 +27,7 @@ A first session, while `cogmap run` runs in another terminal:
   cogmap log cat drive.mcap action/selected
   cogmap log image drive.mcap         a camera image, as a file
   cogmap log replay drive.mcap --into sensory
+  cogmap log summary runs/latest      a run's folder stands for its log
 """
 
 
