@@ -17,7 +17,7 @@ from cogmap.geometry.arrays import Floats, Indices
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta
-from cogmap.schemas.nodes import Self
+from cogmap.schemas.nodes import NEVER_NS, Self
 from cogmap.schemas.process import Playback
 from cogmap.schemas.sensing import Odometry, Pose, SelfMotion, TruePose, TrueTown
 
@@ -176,10 +176,11 @@ class Observer:
             self.recalled_m = self.travelled_m
 
         for operation in delta.operations:
-            if isinstance(operation, Self):
+            if isinstance(operation, Self) and operation.stamp_ns > NEVER_NS:
+                # A late correction of the map moves the pose of a cycle before its own.
                 position_m = np.array([[operation.x_m, operation.y_m]])
                 ((x_m, y_m),) = self._frame.from_start(position_m).tolist()
-                self._estimate.add(delta.stamp_ns, x_m, y_m)
+                self._estimate.add(operation.stamp_ns, x_m, y_m)
 
     @property
     def has_begun(self) -> bool:

@@ -47,10 +47,10 @@ def joined() -> Observer:
     )
     observer = Observer()
     observer.update(TruePose(stamp_ns=1, pose=START, travelled_m=4.0, progress=0.0))
-    observer.update(delta(1, agent(x_m=4.0)))
+    observer.update(delta(1, agent(x_m=4.0, stamp_ns=1)))
     observer.update(delta(2, recollection))
     observer.update(delta(3, Map(id=ROOT_MAP, cell_m=1.0, remembered="remembered:1")))
-    observer.update(delta(4, agent(x_m=105.0)))
+    observer.update(delta(4, agent(x_m=105.0, stamp_ns=4)))
     return observer
 
 

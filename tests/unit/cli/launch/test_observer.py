@@ -35,10 +35,12 @@ def odometry(tick: int, speed_m_s: float, turn_rate_rad_s: float = 0.0) -> Odome
     return wheels(0, speed_m_s, turn_rate_rad_s, stamp_ns=tick * TICK_NS, dt_s=TICK_S)
 
 
-def estimate(tick: int, x_m: float, y_m: float, version: int = 1) -> Delta:
-    operations = [DropNode(id="object:inn"), agent(x_m=x_m, y_m=y_m)]
+def estimate(
+    tick: int, x_m: float, y_m: float, version: int = 1, committed_tick: int | None = None
+) -> Delta:
+    operations = [DropNode(id="object:inn"), agent(x_m=x_m, y_m=y_m, stamp_ns=tick * TICK_NS)]
     return Delta(
-        stamp_ns=tick * TICK_NS,
+        stamp_ns=(tick if committed_tick is None else committed_tick) * TICK_NS,
         version=version,
         cycle=1,
         phase=Phase.LOCALIZATION,
@@ -132,6 +134,17 @@ def test_the_last_of_several_estimates_of_one_stamp_counts() -> None:
     observer.update(estimate(4, 0.2, 0.0, version=2))
 
     assert observer.errors().estimate_m == pytest.approx([0.0], abs=1e-12)
+
+
+def test_a_pose_that_is_corrected_later_counts_for_its_own_time() -> None:
+    observer = driven(ticks=20)
+    observer.update(estimate(10, 0.5, 0.3))
+    observer.update(estimate(10, 0.5, 0.1, version=2, committed_tick=18))
+
+    errors = observer.errors()
+
+    assert errors.stamps_ns.tolist() == [10 * TICK_NS]
+    assert errors.estimate_m.tolist() == pytest.approx([0.1])
 
 
 def test_the_agents_frame_starts_in_the_first_true_pose() -> None:

@@ -130,7 +130,7 @@ def learned() -> Delta:
     y_m = building.pose.y_m - town.start.y_m
     samples = np.random.default_rng(0).normal([x_m, y_m], 0.5, (50, 2))
     operations = [
-        agent(x_m=2.1),
+        agent(x_m=2.1, stamp_ns=2 * STEP_NS),
         landmark(building.name, samples, x_m=x_m, y_m=y_m),
         Cells(
             column=PlaceColumn.ROAD,
