@@ -16,11 +16,8 @@ from cogmap.services.codelets.mapping.ranges import Landmarks, Ranges
 
 # Times that sightings are weighed anew by the path that is found: each solves the whole path.
 ROUNDS = 5
-# Sides of a building whose views share an error, and successive sightings of one along the path
-# whose errors are alike, so that together they count as one: measured over three laps
-# of towns 1 to 3.
+# Sides of a building whose views share an error: measured over three laps of towns 1 to 3.
 SIDES = 16
-CORRELATED = 5.0
 
 
 def optimize_jointly(
@@ -32,9 +29,7 @@ def optimize_jointly(
 
     Where a landmark seems to be depends on the side that it is seen from: of a building the front
     is measured, and its depth assumed. So each of its sides is taken for a landmark of its own,
-    which binds one pass to the next past the same side, and bends neither. Sightings in a row err
-    alike: CORRELATED of them count as one. Points have one side, and their sightings err
-    independently.
+    which binds one pass to the next past the same side, and bends neither. Points have one side.
 
     `seen` are sightings of landmarks whose extent is known: the part that shows at the view's
     border, of one whose size nobody knows, moves with the agent, and would bend the path.
@@ -46,13 +41,11 @@ def optimize_jointly(
     if not len(seen.place) and not is_heard_alone:
         return poses, 1
 
-    are_points = config.landmarks == "points"
-    sides = by_side(seen, poses, 1 if are_points else SIDES)
-    correlated = 1.0 if are_points else CORRELATED
+    sides = by_side(seen, poses, 1 if config.landmarks == "points" else SIDES)
     landmarks_m = sides.landmarks_m(poses)
     for _ in range(ROUNDS):
         path = replace(graph, poses=poses)
-        joint = with_landmarks(path, sides, landmarks_m, correlated)
+        joint = with_landmarks(path, sides, landmarks_m)
         joint = with_ranges(joint, heard, heard.landmarks(poses))
         optimized = optimize(joint)
         landmarks_m = optimized[len(poses) : len(poses) + len(landmarks_m), :2]
@@ -75,16 +68,14 @@ def with_ranges(graph: PoseGraph, heard: Ranges, found: Landmarks) -> PoseGraph:
     )
 
 
-def with_landmarks(
-    graph: PoseGraph, seen: Sightings, landmarks_m: Floats, correlated: float = 1.0
-) -> PoseGraph:
-    """Add (k, 2) landmarks to `graph`, as poses after those of the path, bound to it by sightings
-    of which `correlated` count as one.
+def with_landmarks(graph: PoseGraph, seen: Sightings, landmarks_m: Floats) -> PoseGraph:
+    """Add (k, 2) landmarks to `graph`, as poses after those of the path, bound to it by
+    sightings.
     """
     headings_rad = np.zeros(len(landmarks_m))
     landmarks = np.column_stack([landmarks_m, headings_rad])
 
-    weights = seen.weights(graph.poses, landmarks_m) / correlated
+    weights = seen.weights(graph.poses, landmarks_m)
     sightings = seen.constraints(len(graph.poses), weights)
 
     return replace(
