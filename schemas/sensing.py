@@ -307,8 +307,10 @@ class Street(Part, kw_only=True, frozen=True):
 class Building(Part, kw_only=True, frozen=True):
     """A building's footprint: centre, width along its heading, depth across it, height.
 
-    `outline_m` are the corners, (x, y) in metres, counter-clockwise, of one that is no rectangle.
-    `function` is what it is used for, `district` the part of the town that it is in.
+    `roof_rise_m` is how much higher the ridge of its roof, along its width, is than its eaves; 0 of
+    a flat one. `outline_m` are the corners, (x, y) in metres, counter-clockwise, of one that is no
+    rectangle, and has a flat roof. `function` is what it is used for, `district` the part of the
+    town that it is in.
     """
 
     name: Name
@@ -316,6 +318,7 @@ class Building(Part, kw_only=True, frozen=True):
     width_m: Metres
     depth_m: Metres
     height_m: Metres
+    roof_rise_m: Metres = 0.0
     district: str = ""
     function: str = ""
     outline_m: list[tuple[Finite, Finite]] = []

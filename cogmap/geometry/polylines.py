@@ -53,18 +53,25 @@ def nearest_on_line(line_m: Floats, points_m: Floats) -> Nearest:
     return nearest_on_pieces(line_m[:-1], line_m[1:], points_m)
 
 
+class Crossings(NamedTuple):
+    """Where each of k rays crosses each of m straight pieces, (k, m): `range_m` along the ray,
+    infinity where it does not, and at which `share` of the piece.
+    """
+
+    range_m: Floats
+    share: Floats
+
+
 def crossings_of(
     starts_m: Floats, ends_m: Floats, from_m: Floats, directions_rad: Floats
-) -> Floats:
-    """Return how far from the point `from_m` (2,) a ray in each of (k,) directions crosses each of
-    m straight pieces, from (m, 2) `starts_m` to `ends_m`: (k, m) in metres, infinity where it does
-    not.
+) -> Crossings:
+    """Return where rays from the point `from_m` (2,) in each of (k,) directions cross straight
+    pieces, from (m, 2) `starts_m` to `ends_m`.
     """
     along = np.column_stack([np.cos(directions_rad), np.sin(directions_rad)])
     pieces_m = ends_m - starts_m
     offset_m = starts_m - from_m
 
-    # A ray and a piece cross at `range_m` along the ray and at `share` of the piece.
     cross_m = along[:, :1] * pieces_m[:, 1] - along[:, 1:] * pieces_m[:, 0]
     reach = offset_m[:, 0] * pieces_m[:, 1] - offset_m[:, 1] * pieces_m[:, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -72,7 +79,7 @@ def crossings_of(
         share = (along[:, 1:] * offset_m[:, 0] - along[:, :1] * offset_m[:, 1]) / cross_m
 
     is_crossed = (range_m > 0) & (share >= 0) & (share <= 1)
-    return np.where(is_crossed, range_m, np.inf)
+    return Crossings(np.where(is_crossed, range_m, np.inf), np.where(is_crossed, share, 0.0))
 
 
 def nearest_on_pieces(starts_m: Floats, ends_m: Floats, points_m: Floats) -> Nearest:

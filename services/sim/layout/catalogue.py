@@ -11,13 +11,17 @@ import numpy as np
 
 Colour = tuple[int, int, int]
 
+FLAT_M = 0.0
+GABLE_M = 2.2
+"""How much higher than its eaves the ridge of a roof is."""
+
 
 @dataclass(frozen=True)
 class BuildingType:
-    """Size in metres, colours as RGB bytes, `pattern` and `roof_shape` as `patterns` and `mesh`
-    draw them.
+    """Size in metres, colours as RGB bytes, `pattern` as `patterns` draws it.
 
-    `accent` is the second strong colour: of shutters, bands or stripes.
+    `accent` is the second strong colour: of shutters, bands or stripes. `roof_rise_m` is how much
+    higher the roof's ridge, along the width, is than its eaves; 0 of a flat roof.
     """
 
     name: str
@@ -30,7 +34,7 @@ class BuildingType:
     door: Colour
     roof: Colour
     pattern: str
-    roof_shape: str = "flat"
+    roof_rise_m: float = FLAT_M
 
 
 def _rgb(hexadecimal: str) -> Colour:
@@ -45,7 +49,7 @@ def _type(
     finish: tuple[str, str],
     pattern: str,
     *,
-    shape: str = "flat",
+    roof_rise_m: float = FLAT_M,
 ) -> BuildingType:
     """Make a type; `size_m`: width, depth, height; `colours`: of wall, accent and door; `finish`:
     colours of trim and roof.
@@ -65,7 +69,7 @@ def _type(
         door=_rgb(door),
         roof=_rgb(roof),
         pattern=pattern,
-        roof_shape=shape,
+        roof_rise_m=roof_rise_m,
     )
 
 
@@ -85,7 +89,7 @@ CATALOGUE: tuple[BuildingType, ...] = (
         "f0b048 84341c 602c18",
         (_CREAM, _TILE),
         "shutters",
-        shape="gable",
+        roof_rise_m=GABLE_M,
     ),
     _type("library", (13.5, 10.0, 9.0), "962c28 eee2c4 40281c", (_CREAM, _SLATE), "bands"),
     _type(
@@ -94,7 +98,7 @@ CATALOGUE: tuple[BuildingType, ...] = (
         "e8ce60 244696 243c80",
         (_WHITE, _SLATE),
         "bands",
-        shape="gable",
+        roof_rise_m=GABLE_M,
     ),
     _type("pharmacy", (8.0, 7.0, 7.0), "eef0ec 16a04c 146e3c", ("16a04c", _SLATE), "cross"),
     _type("post_office", (10.0, 8.0, 7.5), "f8d21e 222226 222226", (_DARK, _DARK), "bands"),
@@ -110,7 +114,7 @@ CATALOGUE: tuple[BuildingType, ...] = (
         "f6a8ce 2e8a34 2e8a34",
         ("2e8a34", _THATCH),
         "stripes",
-        shape="gable",
+        roof_rise_m=GABLE_M,
     ),
     _type("cafe", (7.5, 7.0, 6.0), "46b2b2 faeccc 7e4224", (_CREAM, _TILE), "stripes"),
     _type(
@@ -119,7 +123,7 @@ CATALOGUE: tuple[BuildingType, ...] = (
         "b0dcbe 5c3e8c 46326e",
         (_STONE, _COPPER),
         "columns",
-        shape="gable",
+        roof_rise_m=GABLE_M,
     ),
     _type("theatre", (12.5, 11.0, 12.0), "78163a deac62 3c0e1e", ("deac62", _COPPER), "columns"),
     _type("workshop", (10.5, 9.5, 5.5), "60666e f48414 f48414", ("f48414", _SLATE), "gates"),
@@ -129,7 +133,7 @@ CATALOGUE: tuple[BuildingType, ...] = (
         "7c4a22 cede3c 345226",
         (_CREAM, _TILE),
         "grid",
-        shape="gable",
+        roof_rise_m=GABLE_M,
     ),
     _type("greengrocer", (8.5, 7.0, 6.0), "80c43a f6f6e8 386822", (_WHITE, _TILE), "stripes"),
     _type(
@@ -138,7 +142,7 @@ CATALOGUE: tuple[BuildingType, ...] = (
         "1e5442 e25a48 962822",
         (_CREAM, _TILE),
         "shutters",
-        shape="gable",
+        roof_rise_m=GABLE_M,
     ),
     _type("clinic", (13.0, 8.0, 7.0), "c4e2f6 ce1e2c 4678a0", (_WHITE, _SLATE), "cross"),
     _type(
@@ -147,7 +151,7 @@ CATALOGUE: tuple[BuildingType, ...] = (
         "2892e0 faf0dc f8c43c",
         (_WHITE, _THATCH),
         "planks",
-        shape="gable",
+        roof_rise_m=GABLE_M,
     ),
     _type(
         "toy_shop",
@@ -155,7 +159,7 @@ CATALOGUE: tuple[BuildingType, ...] = (
         "fae23c de2882 de2882",
         ("286ed2", _TILE),
         "checker",
-        shape="gable",
+        roof_rise_m=GABLE_M,
     ),
     _type("tailor", (6.0, 6.5, 9.5), "a484d6 3c2060 3c2060", (_WHITE, _SLATE), "shutters"),
     _type(
@@ -164,7 +168,7 @@ CATALOGUE: tuple[BuildingType, ...] = (
         "eee8d6 5c3820 462c1a",
         ("5c3820", _THATCH),
         "timber",
-        shape="gable",
+        roof_rise_m=GABLE_M,
     ),
 )
 
@@ -227,7 +231,7 @@ def _invent(name: str, rng: np.random.Generator) -> BuildingType:
         door=_paint(rng),
         roof=roof,
         pattern=pattern,
-        roof_shape="gable" if is_gabled else "flat",
+        roof_rise_m=GABLE_M if is_gabled else FLAT_M,
     )
 
 

@@ -10,6 +10,7 @@ from cogmap.geometry.arrays import Floats
 from cogmap.schemas.array import Array
 from cogmap.schemas.sensing import Building, Obstacle, Pose, Street, TrueTown
 from cogmap.services.sim.layout.boundaries import kerbs, outlines
+from cogmap.services.sim.layout.catalogue import FLAT_M
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE, Prop
 from cogmap.services.sim.layout.plan import Plot, Point, Road
 
@@ -65,6 +66,7 @@ class Place:
                 width_m=plot.kind.width_m,
                 depth_m=plot.kind.depth_m,
                 height_m=plot.kind.height_m,
+                roof_rise_m=FLAT_M if plot.outline else plot.kind.roof_rise_m,
                 district=plot.district,
                 function=plot.function,
                 outline_m=list(plot.outline),

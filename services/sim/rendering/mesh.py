@@ -17,8 +17,7 @@ from cogmap.services.sim.rendering.wall import PX_PER_M, Image
 
 Vertex = tuple[float, float, float]
 UV = tuple[float, float]
-# Looks: the height of a gable; the roof's picture; the wall that is repeated around an outline.
-_ROOF_RISE_M = 2.2
+# Looks: the roof's picture; the wall that is repeated around an outline.
 _ROOF = 4
 _BAY_M = 8.0
 
@@ -92,8 +91,8 @@ def building(kind: BuildingType) -> tuple[Mesh, Image]:
     half_width_m = kind.width_m / 2
     half_depth_m = kind.depth_m / 2
     height_m = kind.height_m
-    is_gabled = kind.roof_shape == "gable"
-    eaves_m = height_m - _ROOF_RISE_M if is_gabled else height_m
+    is_gabled = kind.roof_rise_m > 0
+    eaves_m = height_m - kind.roof_rise_m
 
     corners: list[Point] = [
         (-half_width_m, -half_depth_m),

@@ -11,7 +11,7 @@ from itertools import combinations
 import numpy as np
 
 from cogmap.services.sim.layout.blocks.streets import Grid
-from cogmap.services.sim.layout.catalogue import CATALOGUE, BuildingType, Colour
+from cogmap.services.sim.layout.catalogue import CATALOGUE, FLAT_M, GABLE_M, BuildingType, Colour
 from cogmap.services.sim.layout.plan import Point
 
 # Made up: the share of buildings with their district's function; how many districts there are, by
@@ -219,7 +219,7 @@ def _invent(rng: np.random.Generator, name: str, function: str, style: Style) ->
         door=_paint(rng, float(rng.random()), (0.3, 0.6)),
         roof=style.roof,
         pattern=pattern,
-        roof_shape="gable" if is_gabled else "flat",
+        roof_rise_m=GABLE_M if is_gabled else FLAT_M,
     )
 
 

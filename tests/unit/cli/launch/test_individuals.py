@@ -19,7 +19,7 @@ from cogmap.graph.replica import Fetched, Replica
 from cogmap.robot import calibration
 from cogmap.schemas.graph import Delta, DropNode, Link, Links, Operation, Phase, SnapshotRequest
 from cogmap.schemas.nodes import LinkKind, Object, Percept
-from cogmap.schemas.sensing import Building, Pose, TruePose, TrueTown
+from cogmap.schemas.sensing import Building, Calibration, Pose, TruePose, TrueTown
 from cogmap.testing import agent, landmark, percept, percepts, stamp_ns
 
 START = Pose(x_m=100.0, y_m=50.0, heading_rad=math.pi / 2)
@@ -127,6 +127,56 @@ def test_a_building_with_an_outline_is_where_that_is() -> None:
 
     shown = buildings.shown_at(np.array([(1.0, 1.0), (1.0, 19.0), (12.0, 12.0)]))
     assert shown.tolist() == [0, 0, NOTHING]
+
+
+@pytest.mark.parametrize(
+    ("heading_rad", "column", "row", "shown"),
+    [
+        (math.pi / 2, 50, 62, "near"),
+        (math.pi / 2, 50, 45, "near"),
+        (math.pi / 2, 50, 40, "behind"),
+        (0.0, 50, 40, "near"),
+        (0.0, 68, 45, "behind"),
+    ],
+    ids=["wall", "slope", "above the ridge", "gable", "beside the gable's top"],
+)
+def test_what_shows_above_the_eaves_of_a_roof_is_the_building_behind_it(
+    heading_rad: float, column: int, row: int, shown: str
+) -> None:
+    """The robot looks along x at eaves 4 m high, 17 m ahead, or at a gable of 6.5 m, 16 m ahead."""
+    camera = Calibration(
+        width_px=100,
+        height_px=100,
+        fx_px=100.0,
+        fy_px=100.0,
+        cx_px=50.0,
+        cy_px=70.0,
+        baseline_m=0.1,
+        mount_forward_m=0.0,
+        mount_height_m=1.0,
+    )
+    near = Building(
+        name="near",
+        pose=Pose(x_m=20.0, y_m=0.0, heading_rad=heading_rad),
+        width_m=8.0,
+        depth_m=6.0,
+        height_m=6.5,
+        roof_rise_m=2.5,
+    )
+    behind = Building(
+        name="behind",
+        pose=Pose(x_m=40.0, y_m=0.0, heading_rad=0.0),
+        width_m=8.0,
+        depth_m=20.0,
+        height_m=30.0,
+    )
+    buildings = Buildings(TrueTown(seed=1, streets=[], buildings=[near, behind]))
+    left, right = column - 1, column + 1
+    outline_px = [(left, row - 1), (right, row - 1), (right, row + 1), (left, row + 1)]
+
+    number = buildings.shown_in(np.zeros(3), outline_px, camera)
+
+    assert buildings.names[number] == shown
 
 
 def test_an_object_is_the_building_that_most_of_its_percepts_show() -> None:
