@@ -53,7 +53,7 @@ def nearest_on_line(line_m: Floats, points_m: Floats) -> Nearest:
     return nearest_on_pieces(line_m[:-1], line_m[1:], points_m)
 
 
-class Crossings(NamedTuple):
+class RayCrossings(NamedTuple):
     """Where each of k rays crosses each of m straight pieces, (k, m): `range_m` along the ray,
     infinity where it does not, and at which `share` of the piece.
     """
@@ -64,7 +64,7 @@ class Crossings(NamedTuple):
 
 def crossings_of(
     starts_m: Floats, ends_m: Floats, from_m: Floats, directions_rad: Floats
-) -> Crossings:
+) -> RayCrossings:
     """Return where rays from the point `from_m` (2,) in each of (k,) directions cross straight
     pieces, from (m, 2) `starts_m` to `ends_m`.
     """
@@ -79,7 +79,7 @@ def crossings_of(
         share = (along[:, 1:] * offset_m[:, 0] - along[:, :1] * offset_m[:, 1]) / cross_m
 
     is_crossed = (range_m > 0) & (share >= 0) & (share <= 1)
-    return Crossings(np.where(is_crossed, range_m, np.inf), np.where(is_crossed, share, 0.0))
+    return RayCrossings(np.where(is_crossed, range_m, np.inf), np.where(is_crossed, share, 0.0))
 
 
 def nearest_on_pieces(starts_m: Floats, ends_m: Floats, points_m: Floats) -> Nearest:
