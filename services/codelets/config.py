@@ -82,8 +82,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Seconds,
         Meta(description="Least time between two loop closures by the same cue, in s."),
     ] = 2.0
-    # What self-motion states is what it errs by, over 1 to 60 m of ten drives with cameras; the
-    # least variances of a heading are for a sense that states less than any is exact to.
+    # Over 1 to 60 m of ten drives with cameras, self-motion errs on average by about what it
+    # states; the least variances of a heading are for a sense that states less than any can.
     path_variance_per_m: Annotated[
         Positive,
         Meta(description="Least variance of path integration's position, m^2 per m."),

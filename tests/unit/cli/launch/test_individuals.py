@@ -155,21 +155,13 @@ def test_what_shows_above_the_eaves_of_a_roof_is_the_building_behind_it(
         mount_forward_m=0.0,
         mount_height_m=1.0,
     )
-    near = Building(
-        name="near",
+    near = msgspec.structs.replace(
+        building("near", (20.0, 0.0)),
         pose=Pose(x_m=20.0, y_m=0.0, heading_rad=heading_rad),
-        width_m=8.0,
-        depth_m=6.0,
         height_m=6.5,
         roof_rise_m=2.5,
     )
-    behind = Building(
-        name="behind",
-        pose=Pose(x_m=40.0, y_m=0.0, heading_rad=0.0),
-        width_m=8.0,
-        depth_m=20.0,
-        height_m=30.0,
-    )
+    behind = msgspec.structs.replace(building("behind", (40.0, 0.0)), depth_m=20.0, height_m=30.0)
     buildings = Buildings(TrueTown(seed=1, streets=[], buildings=[near, behind]))
     left, right = column - 1, column + 1
     outline_px = [(left, row - 1), (right, row - 1), (right, row + 1), (left, row + 1)]
