@@ -22,6 +22,7 @@ from benchmarks.learning import measure as learning
 from benchmarks.lifelong import measure as lifelong
 from benchmarks.localization import beacons, trees, without_names
 from benchmarks.localization import measure as localization
+from benchmarks.log_api import measure as log_api
 from benchmarks.map_correction import false_groups
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
@@ -156,6 +157,7 @@ SUITE = (
     Benchmark("memory", memory.THRESHOLDS, memory.measure, options=[PROCESSES]),
     Benchmark("learning", learning.THRESHOLDS, learning.measure, options=[PROCESSES]),
     Benchmark("lifelong", lifelong.THRESHOLDS, lifelong.measure, options=lifelong.OPTIONS),
+    Benchmark("log_api", log_api.THRESHOLDS, log_api.measure, options=log_api.OPTIONS),
     Benchmark(
         "cue-integration",
         paper.CUE_INTEGRATION_THRESHOLDS,

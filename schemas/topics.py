@@ -52,6 +52,11 @@ class Topic:
     keep_in_log: bool = True
     sensed: bool = False
 
+    @property
+    def carries_images(self) -> bool:
+        """Return whether its messages are images: large, each in the place of the one before."""
+        return self.max_bytes > MIB and self.delivery is Delivery.LATEST_WINS
+
     def key(self, agent: str) -> str:
         """Return the Zenoh key expression of this topic for `agent`."""
         return f"cogmap/{agent}/{self.name}"

@@ -9,7 +9,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from cogmap.bus.codec import Envelope
+from cogmap.bus.codec import Envelope, decode
 from cogmap.errors import LogError, MessageError
 from cogmap.graph.graph import Graph
 from cogmap.recording import selection, table
@@ -127,8 +127,14 @@ class Log:
         there is no pyarrow.
         """
         (chosen,) = selection.named([topic])
-        entries = self.messages(chosen, start_s=start_s, end_s=end_s)
-        return table.table(chosen.type, ((entry.time_s, entry.message) for entry in entries))
+        first_ns, end_ns = self._span_ns(start_s, end_s)
+        payloads = self._reader.payloads(chosen, start_ns=first_ns, end_ns=end_ns)
+
+        def rows() -> Iterator[tuple[float, Message]]:
+            for log_time_ns, payload in payloads:
+                yield (log_time_ns - self._start_ns) / 1e9, self._decoded(chosen, payload)
+
+        return table.table(chosen.type, rows())
 
     def last(self, topic: str | Topic, holds: Callable[[Any], bool]) -> Entry | None:
         """Return the last message on `topic` for which `holds` is true; None if it is for none.
@@ -176,16 +182,22 @@ class Log:
     def _between(
         self, chosen: Collection[Topic] | None, start_s: float, end_s: float | None
     ) -> Iterator[Record]:
-        first_ns = self._start_ns + round(start_s * 1e9)
+        first_ns, end_ns = self._span_ns(start_s, end_s)
+        return self._reader.records(chosen, start_ns=first_ns, end_ns=end_ns)
+
+    def _span_ns(self, start_s: float, end_s: float | None) -> tuple[int, int]:
+        """Return the log times between which, in seconds into the log, something is asked for."""
         end_ns = MAX_TIME_NS
         if end_s is not None:
             end_ns = self._start_ns + round(end_s * 1e9)
-
-        return self._reader.records(chosen, start_ns=first_ns, end_ns=end_ns)
+        return self._start_ns + round(start_s * 1e9), end_ns
 
     def _message(self, record: Record) -> Message:
+        return self._decoded(record.topic, self._reader.payload(record))
+
+    def _decoded(self, topic: Topic, payload: bytes) -> Message:
         try:
-            return self._reader.message(record)
+            return decode(topic, payload)
         except MessageError as error:
             raise LogError(f"{self.path}: a message cannot be read: {error}") from None
 

@@ -2,8 +2,9 @@
 
 A message's record holds the bytes that travelled. Its log time is when it was received, its publish
 time when it was sent, its sequence the sender's number. The record before it, on the channel
-`_envelope`, holds its envelope. Log times never decrease: where the wall clock was set back, a
-message has its predecessor's time.
+`_envelope`, holds its envelope. Each message has a later log time than the one before: where the
+wall clock was set back or stood, by a nanosecond. Images, other large messages, and small ones are
+in chunks of their own, which overlap in time: see `writer.Content`.
 
 A schema is called by the message's type, is encoded as `jsonschema`, and describes bytes encoded as
 `msgpack`; both names are of MCAP's registry. It has no profile for such logs, so the profile is

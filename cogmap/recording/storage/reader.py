@@ -6,9 +6,9 @@ from bisect import bisect_left
 from collections import OrderedDict, defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 import msgspec
 from mcap.records import Message as Written
@@ -18,12 +18,14 @@ from cogmap.errors import LogError
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.format import EnvelopeRecord
 from cogmap.recording.storage.index import (
+    ChunkSpan,
     DamageError,
     channels_in,
     log_file,
     messages_in,
     read_chunk,
     read_index,
+    read_messages,
 )
 from cogmap.recording.storage.versions import check_readable
 from cogmap.schemas.base import Message
@@ -75,6 +77,30 @@ class _Located(NamedTuple):
 _ORDER = attrgetter("order")
 
 
+class EnvelopeSearch:
+    """Where the envelopes of the messages in `chunks` may be, on the channels `envelopes`.
+
+    We write an envelope into the chunk of its message. Other programs may have put it at the end of
+    a chunk before, or all envelopes into chunks of their own.
+    """
+
+    def __init__(self, chunks: Sequence[ChunkSpan], envelopes: frozenset[int]) -> None:
+        self._envelopes = envelopes
+        self._ends_ns = {end_ns for each in chunks for end_ns in (each.first_ns, each.last_ns)}
+        self._without = [each for each in chunks if not each.has_any(envelopes)]
+
+    def may_be_in(self, chunk: ChunkSpan) -> bool:
+        """Return whether some of them may be in `chunk`."""
+        if not chunk.has_any(self._envelopes):
+            return False
+        if not self._ends_ns.isdisjoint((chunk.first_ns, chunk.last_ns)):
+            return True
+        return any(
+            chunk.last_ns >= other.first_ns and chunk.first_ns <= other.last_ns
+            for other in self._without
+        )
+
+
 class LogReader:
     """The log at `path`, or in the run's folder there. `cut_bytes` at its end belong to no whole
     record: it was cut off, or is being written.
@@ -92,6 +118,7 @@ class LogReader:
         self.metadata = index.metadata
         self.cut_bytes = index.unreadable_bytes
         self._chunks = index.chunks
+        self._indexed = {channel for each in index.chunks for channel in each.indexes or {}}
         self._cache: OrderedDict[int, list[Written]] = OrderedDict()
         check_readable(path, index.library, self.about(layout.RECORDING).get("software", ""))
 
@@ -136,11 +163,7 @@ class LogReader:
         share of chunks that have been read. Raises LogError.
         """
         waiting: list[_Located] = []
-        numbers = [
-            number
-            for number, chunk in enumerate(self._chunks)
-            if chunk.last_ns >= start_ns and chunk.first_ns < end_ns
-        ]
+        numbers = self._numbers(topics, start_ns, end_ns)
         for done, number in enumerate(numbers, start=1):
             for position, message in enumerate(self._messages(number)):
                 if start_ns <= message.log_time < end_ns:
@@ -150,8 +173,8 @@ class LogReader:
 
             # Chunks may overlap: what is as late as the next one's first message waits for it.
             ready = len(waiting)
-            if number + 1 < len(self._chunks):
-                next_begins: tuple[int, ...] = (self._chunks[number + 1].first_ns,)
+            if done < len(numbers):
+                next_begins: tuple[int, ...] = (self._chunks[numbers[done]].first_ns,)
                 ready = bisect_left(waiting, next_begins, key=_ORDER)
             yield from self._with_envelopes(waiting[:ready], topics)
             del waiting[:ready]
@@ -159,6 +182,28 @@ class LogReader:
             if progress is not None:
                 progress(done / len(numbers))
         yield from self._with_envelopes(waiting, topics)
+
+    def payloads(
+        self, topic: Topic, *, start_ns: int = 0, end_ns: int = layout.MAX_TIME_NS + 1
+    ) -> list[tuple[int, bytes]]:
+        """Return the log time and the bytes of each message on `topic`, in order of log time.
+
+        Of chunks that have an index only these messages are looked at, which `records` is five to
+        ten times as slow as. Raises LogError.
+        """
+        found = []
+        channels = self._channels_of({topic.name})
+        with self.path.open("rb") as file:
+            for number in self._numbers([topic], start_ns, end_ns):
+                offset = self._chunks[number].offset
+                messages = self._messages_on(topic, file, number, channels)
+                for position, message in enumerate(messages):
+                    if start_ns <= message.log_time < end_ns:
+                        order = message.log_time, offset, position
+                        found.append((order, message.data))
+
+        found.sort(key=itemgetter(0))
+        return [(order[0], data) for order, data in found]
 
     def payload(self, record: Record) -> bytes:
         """Return the bytes of a message, as they travelled.
@@ -214,6 +259,57 @@ class LogReader:
                 size=len(message.data),
             )
 
+    def _numbers(self, topics: Collection[Topic] | None, start_ns: int, end_ns: int) -> list[int]:
+        """Return the numbers of the chunks in which messages on `topics`, of these times, or their
+        envelopes may be.
+        """
+        within = [
+            number
+            for number, chunk in enumerate(self._chunks)
+            if chunk.last_ns >= start_ns and chunk.first_ns < end_ns
+        ]
+        if topics is None:
+            return within
+
+        envelopes = self._channels_of({layout.ENVELOPES})
+        wanted = self._channels_of({topic.name for topic in topics})
+        chosen = {number for number in within if self._chunks[number].has_any(wanted)}
+        search = EnvelopeSearch([self._chunks[number] for number in chosen], envelopes)
+        return [
+            number
+            for number in within
+            if number in chosen or search.may_be_in(self._chunks[number])
+        ]
+
+    def _channels_of(self, names: set[str]) -> frozenset[int]:
+        """Return the numbers of the channels of topics with these names, and of those that only a
+        later chunk declares: they may be of any topic.
+        """
+        found = {channel.id for channel in self.channels.values() if channel.topic in names}
+        return frozenset(found | (self._indexed - self.channels.keys()))
+
+    def _messages_on(
+        self, topic: Topic, file: BinaryIO, number: int, channels: frozenset[int]
+    ) -> list[Written]:
+        """Return the messages in a chunk on `topic`, whose channels are among `channels`."""
+        chunk = self._chunks[number]
+        if chunk.indexes is None or not channels <= self.channels.keys():
+            return [each for each in self._messages(number) if self._topic_name(each) == topic.name]
+
+        found = []
+        for channel in sorted(channels):
+            try:
+                found += read_messages(file, chunk, channel)
+            except DamageError as error:
+                raise self._damaged(chunk, error) from None
+        return found
+
+    def _damaged(self, chunk: ChunkSpan, error: DamageError) -> LogError:
+        return LogError(
+            f"{self.path}: the chunk at byte {chunk.offset} is damaged ({error}): "
+            f"`cogmap log recover {self.path} OUT` saves the rest"
+        )
+
     def _topic_name(self, message: Written) -> str:
         """Return the topic of a message's channel, empty if nothing declares that channel."""
         channel = self.channels.get(message.channel_id)
@@ -232,10 +328,7 @@ class LogReader:
         try:
             contents = read_chunk(self.path, chunk)
         except DamageError as error:
-            raise LogError(
-                f"{self.path}: the chunk at byte {chunk.offset} is damaged ({error}): "
-                f"`cogmap log recover {self.path} OUT` saves the rest"
-            ) from None
+            raise self._damaged(chunk, error) from None
 
         self.channels |= channels_in(contents)
         messages = messages_in(contents)

@@ -1,13 +1,14 @@
-"""Writes a log: MCAP in chunks that are flushed often, so that a kill loses only the last one."""
+"""Writes a log: MCAP in chunks that are flushed often, so that a kill loses only the last ones."""
 
 from __future__ import annotations
 
+import enum
 import errno
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 from mcap.writer import CompressionType, Writer
 
@@ -15,9 +16,9 @@ from cogmap.bus.codec import Envelope, encode
 from cogmap.errors import LogError
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.format import EnvelopeRecord
-from cogmap.schemas.topics import Topic
+from cogmap.schemas.topics import MIB, Topic
 
-# What may be lost if the process is killed: messages of so long, or one chunk.
+# What may be lost if the process is killed: messages of so long, or so many bytes.
 FLUSH_S = 0.25
 CHUNK_BYTES = 4 * 2**20
 # Of MCAP's own chunks, so that `flush` alone ends one.
@@ -25,19 +26,45 @@ UNBOUNDED = 2**62
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
+class Content(enum.Enum):
+    """What the messages of a chunk are: who reads poses need not unpack images, nor deltas."""
+
+    SMALL = enum.auto()
+    LARGE = enum.auto()
+    IMAGES = enum.auto()
+
+    @classmethod
+    def of(cls, topic: Topic) -> Content:
+        """Return what the messages of `topic` are."""
+        if topic.carries_images:
+            return cls.IMAGES
+        return cls.LARGE if topic.max_bytes > MIB else cls.SMALL
+
+
+class _Waiting(NamedTuple):
+    """A record of a message, as the library takes it, that is to go into a chunk."""
+
+    channel: int
+    log_time_ns: int
+    data: bytes
+    sent_ns: int
+    sequence: int
+
+
 class LogWriter:
     """A log being written at `path`, with a channel for each of `topics` in that order.
 
-    `about` goes into the file as the facts of the recording. A chunk ends with a call of `flush`,
-    which `write` makes by itself after CHUNK_BYTES. Every method raises LogError if the disk
-    refuses; the log holds what was flushed before, and the writer is of no more use.
+    `about` goes into the file as the facts of the recording. A call of `flush`, which `write` makes
+    by itself after CHUNK_BYTES, ends a chunk of each Content. Every method raises LogError if the
+    disk refuses; the log holds what was flushed before, and the writer is of no more use.
     """
 
     def __init__(self, path: Path, topics: Iterable[Topic], about: Mapping[str, str]) -> None:
         self.path = path
         self._file = open_new(path)
-        self._last_log_ns = 0
+        self._last_log_ns = -1
         self._unflushed_bytes = 0
+        self._waiting: dict[Content, list[_Waiting]] = {content: [] for content in Content}
         self._writer = Writer(self._file, chunk_size=UNBOUNDED, compression=CompressionType.LZ4)
         with self._on_disk():
             self._writer.start(layout.PROFILE, layout.SOFTWARE)
@@ -54,21 +81,22 @@ class LogWriter:
     ) -> None:
         """Add the message that travelled as `payload` on `topic`.
 
-        Its log time is `received_ns`, or that of the message before if the clock was set back.
+        Its log time is `received_ns`, or just after the message before if the clock was set back.
         """
-        log_time_ns = max(self._last_log_ns, layout.time_field(received_ns))
+        log_time_ns = layout.time_field(max(self._last_log_ns + 1, received_ns))
         self._last_log_ns = log_time_ns
         sent_ns = log_time_ns
         sequence = 0
 
+        waiting = self._waiting[Content.of(topic)]
         if envelope is not None:
             sent_ns = layout.time_field(envelope.sent_ns)
             sequence = layout.sequence_field(envelope.seq)
             record = encode(EnvelopeRecord.of(topic, envelope))
-            self._writer.add_message(self._envelopes, log_time_ns, record, sent_ns, sequence)
+            waiting.append(_Waiting(self._envelopes, log_time_ns, record, sent_ns, sequence))
 
         channel = self._channels[topic]
-        self._writer.add_message(channel, log_time_ns, bytes(payload), sent_ns, sequence)
+        waiting.append(_Waiting(channel, log_time_ns, bytes(payload), sent_ns, sequence))
         self._unflushed_bytes += len(payload)
         if self._unflushed_bytes >= CHUNK_BYTES:
             self.flush()
@@ -80,13 +108,18 @@ class LogWriter:
             self._file.flush()
 
     def flush(self) -> None:
-        """Finish the chunk: what was written so far survives this process."""
+        """Finish the chunks: what was written so far survives this process."""
         with self._on_disk():
-            self._writer.flush()  # type: ignore[no-untyped-call]
+            for waiting in self._waiting.values():
+                for record in waiting:
+                    self._writer.add_message(*record)
+                waiting.clear()
+                self._writer.flush()  # type: ignore[no-untyped-call]
         self._unflushed_bytes = 0
 
     def close(self) -> None:
         """Finish the file, with an index at its end."""
+        self.flush()
         with self._on_disk():
             self._writer.finish()  # type: ignore[no-untyped-call]
             self._file.close()

@@ -15,11 +15,16 @@ from cogmap.recording.storage.reader import LogReader
 from cogmap.recording.storage.writer import LogWriter
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta, Phase
 from cogmap.testing import odometry
 from tests.support.logs import ABOUT, SECOND_NS
 
 CHUNKS = 40
 IN_A_CHUNK = 5
+FIRST_OFFSET = 9 + 2 + 4 + 8
+"""Where an index of messages has the first message's offset: after its header, its channel, its
+size and the message's time.
+"""
 
 
 @pytest.fixture
@@ -70,6 +75,48 @@ def test_progress_counts_the_chunks_that_are_read(path: Path) -> None:
     list(LogReader(path).records(None, shares.append, end_ns=5 * SECOND_NS))
 
     assert shares == [0.25, 0.5, 0.75, 1.0]
+
+
+def test_who_reads_small_messages_unpacks_no_images_nor_deltas(tmp_path: Path) -> None:
+    path = tmp_path / "kinds.mcap"
+    writer = LogWriter(path, topics_to_record(), ABOUT)
+    delta = Delta(version=1, cycle=1, phase=Phase.END, operations=[])
+    for number in range(IN_A_CHUNK):
+        at_ns = SECOND_NS + number
+        writer.write(topics.STEREO, bytes(1000), None, at_ns)
+        writer.write(topics.DELTA, encode(delta), None, at_ns)
+        writer.write(topics.ODOMETRY, encode(odometry(number)), None, at_ns)
+    writer.close()
+
+    reader = LogReader(path)
+    order = [record.topic for record in reader.records()]
+    assert order == [topics.STEREO, topics.DELTA, topics.ODOMETRY] * IN_A_CHUNK
+
+    for chunk, topic in enumerate([topics.STEREO, topics.DELTA]):
+        damage(path, chunk)
+        with pytest.raises(LogError, match="is damaged"):
+            list(LogReader(path).records({topic}))
+    assert numbers(path, 0.0, 1.0) == list(range(IN_A_CHUNK))
+    assert open_log(path).frame(topics.ODOMETRY).num_rows == IN_A_CHUNK
+
+
+def test_an_index_that_leads_elsewhere_is_damage(path: Path) -> None:
+    indexes = read_index(path).chunks[7].indexes
+    assert indexes is not None
+    (where,) = indexes.values()
+    content = bytearray(path.read_bytes())
+    content[where + FIRST_OFFSET] ^= 0x01
+    path.write_bytes(content)
+
+    assert len(numbers(path, 0.0, 40.0)) == CHUNKS * IN_A_CHUNK
+    with pytest.raises(LogError, match="is damaged"):
+        open_log(path).frame(topics.ODOMETRY)
+
+
+def test_a_log_that_was_cut_off_gives_the_rows_that_are_whole(path: Path) -> None:
+    path.write_bytes(path.read_bytes()[: read_index(path).chunks[30].offset])
+
+    assert open_log(path).frame(topics.ODOMETRY).num_rows == 30 * IN_A_CHUNK
 
 
 def test_damage_elsewhere_is_not_met(path: Path) -> None:

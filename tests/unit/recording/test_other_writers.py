@@ -20,6 +20,8 @@ from cogmap.testing import odometry
 from tests.support.logs import ABOUT
 
 COUNT = 200
+START_NS = 1_000_000_000
+AT_ONCE = 12
 TOPICS = (topics.ODOMETRY, topics.ENERGY)
 KINDS: dict[str, dict[str, Any]] = {
     "plain": {},
@@ -42,8 +44,8 @@ KINDS: dict[str, dict[str, Any]] = {
 
 @pytest.fixture
 def log(tmp_path: Path) -> Path:
-    """Messages of two sources on each of two topics, four of them with one time and number. What
-    they carry makes no difference here.
+    """Messages of two sources on each of two topics, four of them with one number. What they carry
+    makes no difference here.
     """
     path = tmp_path / "log.mcap"
     writer = LogWriter(path, topics_to_record(), ABOUT)
@@ -52,13 +54,13 @@ def log(tmp_path: Path) -> Path:
             for source in ("a", "b"):
                 envelope = Envelope(source, seq, 1, seq, seq)
                 payload = encode(odometry(seq, source=source))
-                writer.write(topic, payload, envelope, 1_000_000_000 + seq // 3)
+                writer.write(topic, payload, envelope, START_NS)
     writer.close()
     return path
 
 
 def _rewritten(log: Path, reverse: bool = False, **options: Any) -> Path:
-    """The same messages and metadata, written by the library."""
+    """The same messages and metadata, written by the library, twelve with one time."""
     path = log.with_name("rewritten.mcap")
     with log.open("rb") as source, path.open("wb") as target:
         reader = make_reader(source)
@@ -78,7 +80,7 @@ def _rewritten(log: Path, reverse: bool = False, **options: Any) -> Path:
                 )
             writer.add_message(
                 channels[channel.id],
-                message.log_time,
+                START_NS + (message.log_time - START_NS) // AT_ONCE,
                 message.data,
                 message.publish_time,
                 message.sequence,
@@ -151,9 +153,57 @@ def test_zeros_after_the_end_are_no_damage(log: Path, kind: str) -> None:
 
 def test_a_part_of_a_log_without_chunks_is_read_alone(log: Path) -> None:
     reader = LogReader(_rewritten(log, use_chunking=False))
-    begin_ns = 1_000_000_000 + 10
+    begin_ns = START_NS + 10
     records = list(reader.records({topics.ODOMETRY}, start_ns=begin_ns, end_ns=begin_ns + 1))
 
     assert len(records) == 6
     assert {record.topic for record in records} == {topics.ODOMETRY}
     assert {record.log_time_ns for record in records} == {begin_ns}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("reverse", [False, True])
+def test_the_messages_of_a_topic_are_those_among_all(log: Path, kind: str, reverse: bool) -> None:
+    reader = LogReader(_rewritten(log, reverse, **KINDS[kind]))
+    expected = [
+        (record.log_time_ns, reader.payload(record), record.envelope)
+        for record in reader.records()
+        if record.topic is topics.ENERGY
+    ]
+    alone = list(reader.records({topics.ENERGY}))
+
+    found = [(record.log_time_ns, reader.payload(record), record.envelope) for record in alone]
+    assert found == expected
+    assert reader.payloads(topics.ENERGY) == [row[:2] for row in expected]
+
+
+def test_envelopes_are_found_that_have_chunks_of_their_own(log: Path) -> None:
+    """As a tool writes that puts each channel into chunks of its own."""
+    path = log.with_name("sorted.mcap")
+    with log.open("rb") as source, path.open("wb") as target:
+        reader = make_reader(source)
+        writer = Writer(target, chunk_size=2**30)
+        writer.start("", "another tool")
+        for record in reader.iter_metadata():
+            writer.add_metadata(record.name, record.metadata)
+
+        channels: dict[int, int] = {}
+        messages = sorted(reader.iter_messages(), key=lambda each: each[1].id)
+        for schema, channel, message in messages:
+            assert schema is not None
+            if channel.id not in channels:
+                writer.flush()
+                described = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.id] = writer.register_channel(
+                    channel.topic, channel.message_encoding, described, channel.metadata
+                )
+            number = channels[channel.id]
+            writer.add_message(
+                number, message.log_time, message.data, message.publish_time, message.sequence
+            )
+        writer.finish()
+
+    assert _messages(path) == _messages(log)
+    energy = list(LogReader(path).records({topics.ENERGY}))
+    assert len(energy) == 2 * COUNT
+    assert None not in [record.envelope for record in energy]
