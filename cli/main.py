@@ -16,6 +16,10 @@ VERBS = {
         "Write the generated parts of docs/architecture.md.",
     ),
     "config": ("cogmap.cli.config:print_config", "Print every setting of every module, as TOML."),
+    "dashboard": (
+        "cogmap.cli.dashboard.command:dashboard",
+        "Show the mind in a browser, as it runs or from a log.",
+    ),
     "doctor": ("cogmap.cli.doctor.command:doctor", "Find problems, and say how to solve them."),
     "experiment": ("cogmap.cli.experiment.command:experiment", "Run the paper's experiments."),
     "explain": ("cogmap.cli.explain.command:explain", "Explain a moment of a recorded drive."),

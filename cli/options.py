@@ -23,6 +23,9 @@ class FiniteRange(click.FloatRange):
         return number
 
 
+DASHBOARD_PORT = 8470
+"""Where a dashboard serves, if that is free."""
+
 connect_option = click.option(
     "--connect",
     default=DEFAULT_ENDPOINT,

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cogmap.bus.session import free_port
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.launch.display import Display
 from cogmap.cli.launch.forking.client import ForkServer
@@ -21,6 +22,7 @@ from cogmap.cli.launch.plan import (
     ROUTER,
     STATE_NAME,
     Choices,
+    dashboard,
     programs,
     to_toml,
 )
@@ -28,6 +30,7 @@ from cogmap.cli.launch.supervisor import Supervisor
 from cogmap.cli.launch.tally import Tally
 from cogmap.cli.launch.watch import Watch
 from cogmap.cli.launch.watchdog import REMEDY, Situation, Watchdog
+from cogmap.cli.options import DASHBOARD_PORT
 from cogmap.errors import ProcessFailedError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
@@ -67,6 +70,7 @@ class Drive:
     def __post_init__(self) -> None:
         self.supervisor = Supervisor(self.folder, self.server)
         self._watchdog = Watchdog()
+        self._serves_dashboard = False
         self.guide: Guide | None = None
         if self.choices.tour:
             self.guide = Guide(EXPLORE_S, self.choices.goals)
@@ -155,6 +159,7 @@ class Drive:
                 self._note(FIRST_POSE)
             if tally.cycle_ms:
                 self._note("first command")
+                self._serve_dashboard(display)
 
             if time.monotonic() < show_s:
                 continue
@@ -167,6 +172,17 @@ class Drive:
                 shown = self.guide.stage
                 display.show(self.guide.sentence)
         return ending
+
+    def _serve_dashboard(self, display: Display) -> None:
+        """Serve the dashboard, once the start of the others takes no longer for it."""
+        if not self.choices.dashboard or self._serves_dashboard:
+            return
+
+        self._serves_dashboard = True
+        port = free_port(DASHBOARD_PORT)
+        opens = self.choices.opens_dashboard
+        self.supervisor.start(dashboard(self.endpoint, self.agent, port, opens))
+        display.show(f"dashboard: http://127.0.0.1:{port}")
 
     def _note(self, milestone: str) -> None:
         """Keep when a milestone was reached for the first time."""

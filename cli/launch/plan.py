@@ -26,6 +26,7 @@ from cogmap.services.sim.odometry import FUSED
 
 OBSERVER = "observer"
 RECORDER = "recorder"
+DASHBOARD = "dashboard"
 ROUTER = "router"
 START_FIRST = (ROUTER, *registry.BODIES, RECORDER)
 CONFIG_NAME = "config.toml"
@@ -54,7 +55,8 @@ class Choices:
     With `energy` its battery runs down. `without` are the modules that somebody else starts.
     `own_router` is whether the run starts one. `memory` is the database of what was learned in
     earlier runs, a new one where it is None. `recording`, FORMAT:PATH, is played in the place of
-    the simulation, `speed` times as fast as it was recorded.
+    the simulation, `speed` times as fast as it was recorded. With a `dashboard` a browser can
+    watch; one is opened if it `opens_dashboard`.
     """
 
     seed: int | None = None
@@ -72,6 +74,8 @@ class Choices:
     energy: bool = False
     recording: str = ""
     speed: float | None = None
+    dashboard: bool = False
+    opens_dashboard: bool = False
 
     @property
     def modules(self) -> tuple[str, ...]:
@@ -240,3 +244,12 @@ def programs(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[
 
     first = [program for name in START_FIRST for program in found if program.instance == name]
     return [*first, *(program for program in found if program not in first)]
+
+
+def dashboard(endpoint: str, agent: str, port: int, opens: bool) -> Program:
+    """Return the process that serves the dashboard at `port`."""
+    options = ["--tied", "--connect", endpoint, "--agent", agent, "--port", str(port)]
+    if opens:
+        options.append("--open")
+    command = cogmap_command("dashboard", *options)
+    return Program(DASHBOARD, lambda _starts: command, is_needed=False)

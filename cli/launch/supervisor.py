@@ -30,12 +30,13 @@ class Program:
     line.
 
     `command` receives how often it has been started before. One that is held waits for a line on
-    its standard input before it joins the others.
+    its standard input before it joins the others. One that is not needed may fail.
     """
 
     instance: str
     command: Callable[[int], Sequence[str]]
     is_held: bool = False
+    is_needed: bool = True
 
     @classmethod
     def of(cls, instance: str, command: Sequence[str], is_held: bool = False) -> Program:
@@ -209,10 +210,17 @@ class Supervisor:
             child.release()
 
     def check(self) -> None:
-        """Restart what has died. Raises ProcessFailedError if that would not help."""
-        for instance, child in self.children.items():
-            if child.restart_if_dead():
-                self.restarts[instance] += 1
+        """Restart what has died. Raises ProcessFailedError if that would not help one that is
+        needed.
+        """
+        for instance, child in list(self.children.items()):
+            try:
+                if child.restart_if_dead():
+                    self.restarts[instance] += 1
+            except ProcessFailedError:
+                if child.program.is_needed:
+                    raise
+                del self.children[instance]
 
     def end(self, instances: Iterable[str], grace_s: float) -> None:
         """End these together; those that still run after `grace_s` are killed."""

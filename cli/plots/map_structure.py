@@ -7,15 +7,15 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
-from scipy.spatial import ConvexHull, QhullError
 
 from cogmap.cli.launch.observer import Observer
 from cogmap.cli.plots.palette import CUT, GOAL, PLAN, SEVERAL, SHORTCUT
-from cogmap.geometry.arrays import Floats
+from cogmap.geometry.hulls import hull_m
 from cogmap.geometry.se2 import transform_from
+from cogmap.graph.cuts import cut_links_m
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import called
-from cogmap.graph.window import CUT_BELOW, LINK_OFFSETS, ROAD_FROM, WEIGHT_COLUMNS
+from cogmap.graph.window import ROAD_FROM
 from cogmap.schemas.nodes import (
     NEVER_NS,
     PLAN_ID,
@@ -28,9 +28,6 @@ from cogmap.schemas.nodes import (
     Plan,
     is_coarse_map,
 )
-
-STRAIGHT_LINKS = (0, 2)
-MIN_CORNERS = 3
 
 
 def draw_structure(axes: Axes, observer: Observer, graph: Graph) -> list[Line2D]:
@@ -53,18 +50,7 @@ def draw_structure(axes: Axes, observer: Observer, graph: Graph) -> list[Line2D]
 
 def _draw_cuts(axes: Axes, observer: Observer, graph: Graph) -> bool:
     """Draw each straight link that is cut as the side that its two place nodes share."""
-    extent = graph.places.extent(ROOT_MAP)
-    window = graph.places.window(ROOT_MAP, WEIGHT_COLUMNS, extent)
-    weights = window.weights()
-    sides = [np.zeros((0, 2, 2))]
-    for link in STRAIGHT_LINKS:
-        offset = LINK_OFFSETS[link]
-        cells = np.argwhere(weights[link] < CUT_BELOW) + np.array(window.origin)
-        middles = cells + offset / 2
-        across = offset[::-1] / 2
-        sides.append(np.stack([middles - across, middles + across], axis=1))
-
-    ends_m = np.vstack(sides) * graph.cell_m()
+    ends_m = cut_links_m(graph)
     if not len(ends_m):
         return False
 
@@ -81,7 +67,7 @@ def _draw_sub_maps(axes: Axes, observer: Observer, graph: Graph) -> bool:
     for number, sub_map in enumerate(maps):
         members = graph.links.sources(sub_map.id, LinkKind.WITHIN)
         objects = [node for name in members if (node := graph.get(Object, name)) is not None]
-        corners_m = _hull_m(np.array([(node.x_m, node.y_m) for node in objects]).reshape(-1, 2))
+        corners_m = hull_m(np.array([(node.x_m, node.y_m) for node in objects]).reshape(-1, 2))
         if corners_m is None:
             continue
 
@@ -96,18 +82,6 @@ def _draw_sub_maps(axes: Axes, observer: Observer, graph: Graph) -> bool:
         has_any = True
 
     return has_any
-
-
-def _hull_m(points_m: Floats) -> Floats | None:
-    """Return the corners of the convex hull of (n, 2) points; None if they span no area."""
-    if len(points_m) < MIN_CORNERS:
-        return None
-
-    try:
-        corners_m: Floats = points_m[ConvexHull(points_m).vertices]
-    except QhullError:
-        return None
-    return corners_m
 
 
 def _draw_goals(axes: Axes, observer: Observer, graph: Graph) -> bool:

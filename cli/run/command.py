@@ -14,12 +14,14 @@ from cogmap.cli.options import FiniteRange, agent_option, config_option, connect
 from cogmap.cli.run.options import (
     LAP_LIMIT_S,
     codelets_option,
+    dashboard_option,
     energy_option,
     explore_option,
     formats_of_recordings,
     goals_option,
     laps_option,
     lockstep_option,
+    open_option,
     recording_option,
     seed_option,
     speed_option,
@@ -42,6 +44,8 @@ from cogmap.services import registry
 @speed_option
 @lockstep_option
 @codelets_option
+@dashboard_option
+@open_option
 @click.option(
     "--out",
     type=click.Path(path_type=Path),
@@ -91,6 +95,8 @@ def run(
     speed: float | None,
     lockstep: bool,
     codelets: int,
+    dashboard: bool,
+    opens_dashboard: bool,
     out: Path | None,
     memory: Path | None,
     record: bool,
@@ -135,6 +141,8 @@ def run(
             energy=energy,
             recording=recording or "",
             speed=speed,
+            dashboard=dashboard or opens_dashboard,
+            opens_dashboard=opens_dashboard,
         )
         start = Start(
             choices=choices,

@@ -79,6 +79,14 @@ speed_option = click.option(
     type=FiniteRange(0.01, 100),
     help="Play the recording this many times as fast as it was recorded.  [default: 1]",
 )
+dashboard_option = click.option(
+    "--dashboard",
+    is_flag=True,
+    help="Serve a dashboard, for a browser, as `cogmap dashboard` does.",
+)
+open_option = click.option(
+    "--open-dashboard", "opens_dashboard", is_flag=True, help="Serve it, and open it in a browser."
+)
 lockstep_option = click.option(
     "--lockstep/--real-time",
     help="In lockstep the simulation waits for every module: one seed, the same bytes.  "

@@ -9,6 +9,7 @@ import re
 import socket
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import zenoh
@@ -52,9 +53,17 @@ def ready_key(agent: str, member: Member) -> str:
 
 def free_endpoint() -> str:
     """Return an endpoint on this machine where nothing listens."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+    return f"tcp/127.0.0.1:{free_port()}"
+
+
+def free_port(wanted: int = 0) -> int:
+    """Return a port of this machine where nothing listens: `wanted`, if it is one."""
+    for port in (wanted, 0):
+        with socket.socket() as probe, suppress(OSError):
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind(("127.0.0.1", port))
+            return int(probe.getsockname()[1])
+    raise PortInUseError("no port of this machine is free: end something that listens")
 
 
 def open_client(

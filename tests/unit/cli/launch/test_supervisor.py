@@ -51,6 +51,17 @@ def said(folder: Path, instance: str) -> list[str]:
     return (folder / f"{instance}.log").read_text().splitlines()
 
 
+def test_one_that_is_not_needed_may_fail(supervisor: Supervisor) -> None:
+    command = [sys.executable, "-c", "import sys; sys.exit(2)"]
+    supervisor.start(Program("window", lambda starts: command, is_needed=False))
+
+    def is_given_up() -> bool:
+        supervisor.check()
+        return not supervisor.children
+
+    wait_until(is_given_up)
+
+
 def test_a_child_that_is_killed_is_started_again(supervisor: Supervisor, tmp_path: Path) -> None:
     supervisor.start(python("mind", "print('here', flush=True); import sys; sys.stdin.read()"))
     wait_until(lambda: said(tmp_path, "mind") == ["here"])

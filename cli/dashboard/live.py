@@ -1,0 +1,182 @@
+"""A running system as the source of a dashboard."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+import msgspec
+
+from cogmap.bus.codec import Envelope, encode
+from cogmap.bus.interface import Arrival, Member
+from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.dashboard.received import Arrived
+from cogmap.cli.dashboard.scene import FOLLOWED, Scene
+from cogmap.cli.dashboard.source import Playing, Wish
+from cogmap.errors import NoAnswerError, NoRouterError, UsageError
+from cogmap.graph.graph import Graph
+from cogmap.graph.replica import Fetched, Replica, snapshot_over
+from cogmap.runtime.delivery.inbox import Inbox
+from cogmap.runtime.delivery.intake import Intake
+from cogmap.schemas import topics
+from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Offer
+from cogmap.schemas.graph import DropNode, SnapshotRequest
+from cogmap.schemas.nodes import Goal, goal_id
+from cogmap.schemas.sensing import StreetClosure
+from cogmap.schemas.topics import Topic
+from cogmap.services.global_workspace.config import Config
+
+DASHBOARD = "dashboard"
+IDLE_S = 0.1
+RETRY_S = 1.0
+PUBLISHED = (topics.OFFER, topics.STREET_CLOSURE)
+
+
+class Live:
+    """The system at `endpoint`. It is on the bus only while a browser watches, and costs nothing
+    else.
+    """
+
+    def __init__(self, endpoint: str, agent: str) -> None:
+        self.label = f"{agent} at {endpoint}"
+        self.lock = threading.Lock()
+        self._endpoint = endpoint
+        self._agent = agent
+        self._is_wanted = threading.Event()
+        self._has_ended = threading.Event()
+        self._connection: Connection | None = None
+        self.scene = _scene(Replica(_nowhere), self.label)
+        self._thread = threading.Thread(target=self._work, daemon=True)
+        self._thread.start()
+
+    @property
+    def playing(self) -> Playing | None:
+        """Return None: it is no log."""
+        return None
+
+    def watched(self, by: int) -> None:
+        """Join the bus for the first browser, leave it after the last."""
+        if by:
+            self._is_wanted.set()
+        else:
+            self._is_wanted.clear()
+
+    def act(self, wish: Wish) -> str:
+        """Publish what a person wishes. Raises UsageError if it is not for a running system."""
+        connection = self._connection
+        if connection is None:
+            raise UsageError(f"nothing runs at {self._endpoint}: start it with `cogmap run`")
+        with self.lock:
+            message, done = _asked(wish, self.scene.graph)
+        connection.publish(message)
+        return done
+
+    def close(self) -> None:
+        """Leave the bus."""
+        self._has_ended.set()
+        self._is_wanted.set()
+        self._thread.join()
+
+    def _work(self) -> None:
+        while not self._has_ended.is_set():
+            self._is_wanted.wait()
+            if self._has_ended.is_set():
+                break
+            try:
+                bus = ZenohBus(self._endpoint, self._agent, self._has_ended.is_set)
+            except (NoRouterError, KeyboardInterrupt):
+                self._has_ended.wait(RETRY_S)
+                continue
+            self._follow(bus)
+
+    def _follow(self, bus: ZenohBus) -> None:
+        """Follow the system until nobody watches it, or its router is gone."""
+        replica = Replica(snapshot_over(bus))
+        scene = _scene(replica, self.label)
+        with self.lock:
+            scene.follow_on(self.scene)
+            self.scene = scene
+        connection = Connection(bus)
+        try:
+            replica.join()
+            self._connection = connection
+            while self._is_wanted.is_set() and not self._has_ended.is_set():
+                connection.pump(self)
+                if not bus.session.info.routers_zid():
+                    break
+        finally:
+            self._connection = None
+            bus.close()
+
+
+class Connection:
+    """Receives the messages of a system, and publishes what a person wishes."""
+
+    def __init__(self, bus: ZenohBus) -> None:
+        self._bus = bus
+        self._inbox = Inbox()
+        self._intake = Intake()
+        self._numbers: Counter[Topic] = Counter()
+        self._incarnation = time.time_ns()
+        bus.identify(Member(DASHBOARD, DASHBOARD))
+        for topic in PUBLISHED:
+            bus.declare(topic)
+        for topic in FOLLOWED:
+            bus.subscribe(topic, self._inbox.put, self._intake.count_lost)
+
+    def pump(self, live: Live) -> None:
+        """Hand to the scene all that has arrived, waiting IDLE_S for the first of it."""
+        item = self._inbox.take(IDLE_S)
+        while item is not None:
+            if isinstance(item, Arrival):
+                message = self._intake.accept(item)
+                if message is not None:
+                    with live.lock:
+                        live.scene.take(
+                            item.topic, Arrived(message, item.envelope, item.received_ns)
+                        )
+            item = self._inbox.take(0.0)
+
+    def publish(self, message: Message) -> None:
+        """Publish a message of one of the topics PUBLISHED."""
+        topic = topics.of(message)
+        number = self._numbers[topic]
+        self._numbers[topic] += 1
+        now_ns = time.time_ns()
+        envelope = Envelope(DASHBOARD, number, self._incarnation, now_ns, now_ns)
+        numbered = msgspec.structs.replace(message, source=DASHBOARD, seq=number)
+        self._bus.publish(topic, encode(numbered), envelope)
+
+
+def _nowhere(_request: SnapshotRequest) -> Fetched:
+    """Find no workspace, as where no bus is."""
+    raise NoAnswerError("not on a bus")
+
+
+def _scene(replica: Replica, label: str) -> Scene:
+    return Scene(replica.graph, replica.follow, Config(), Path(label))
+
+
+def _asked(wish: Wish, graph: Graph) -> tuple[Message, str]:
+    """Return what to publish for a wish, and what that does."""
+    if wish.street:
+        done = "closed" if wish.closed else "opened"
+        closure = StreetClosure(street=wish.street, closed=wish.closed)
+        return closure, f"{wish.street} is to be {done}"
+
+    if wish.clear:
+        goals = [DropNode(id=goal.id) for goal in graph.of_kind(Goal)]
+        return Offer(cycle=graph.cycle, operations=[*goals]), "every goal is forgotten"
+
+    if isinstance(wish.goal, str) and wish.goal:
+        goal = Goal(id=goal_id(wish.goal), base_level=1.0, object=wish.goal)
+    elif isinstance(wish.goal, tuple):
+        x_m, y_m = wish.goal
+        goal = Goal(id=goal_id(f"{x_m:g},{y_m:g}"), base_level=1.0, x_m=x_m, y_m=y_m)
+    else:
+        raise UsageError("a running system takes goals and streets: give one")
+    name = goal.id.removeprefix(goal_id(""))
+    return Offer(cycle=graph.cycle, operations=[goal]), f"{name} is a goal now"

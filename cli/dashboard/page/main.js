@@ -1,0 +1,137 @@
+// Asks the server for what is new, and hands each part to its panels.
+import { MapView } from "/page/map.js";
+import { showCamera } from "/page/camera.js";
+import { showMind } from "/page/mind.js";
+import { showSystem, showTopics, showMessage } from "/page/system.js";
+import { byId, children, element } from "/page/dom.js";
+
+const RETRY_MS = 1000;
+const map = new MapView(byId("map"), byId("layers"), (x, y) => wish({ goal: [x, y] }));
+const have = {};
+let playing = null;
+let isSliding = false;
+let isLive = false;
+
+function connect() {
+  const socket = new WebSocket(`ws://${location.host}/news`);
+  socket.binaryType = "arraybuffer";
+  const ask = () => socket.send(JSON.stringify({ have, topic: byId("topic").value }));
+  socket.onopen = ask;
+  socket.onmessage = (event) => {
+    show(JSON.parse(new TextDecoder().decode(event.data)));
+    if (document.hidden) setTimeout(ask, RETRY_MS);
+    else requestAnimationFrame(ask);
+  };
+  socket.onclose = () => {
+    setStatus("the dashboard has ended", "bad");
+    for (const name of Object.keys(have)) delete have[name];
+    setTimeout(connect, RETRY_MS);
+  };
+}
+
+function show(news) {
+  byId("label").textContent = news.label;
+  isLive = news.playing === null;
+  byId("player").hidden = isLive;
+  byId("person").hidden = !isLive;
+  map.takesGoals = isLive;
+  if (!isLive) showPlaying(news.playing);
+  for (const [name, part] of Object.entries(news.parts)) {
+    have[name] = part.version;
+    const shown = panels[name];
+    if (shown) shown(part.content);
+  }
+  if (news.message) showMessage(news.message);
+}
+
+const panels = {
+  now: showNow,
+  map: (content) => { map.setMap(content); showNames(content.objects); },
+  camera: showCamera,
+  mind: showMind,
+  system: showSystem,
+  topics: showTopics,
+  truth: (content) => { map.setTruth(content); showStreets(content.streets); },
+};
+
+function showNow(now) {
+  map.setNow(now);
+  const facts = [["time", `${now.at_s.toFixed(1)} s`], ["cycle", now.cycle]];
+  if (now.pose) {
+    const [x, y, heading] = now.pose;
+    const degrees = Math.round(heading * 180 / Math.PI);
+    facts.push(["at", `${x.toFixed(1)}, ${y.toFixed(1)} ± ${now.pose_sd_m.toFixed(2)} m, ${degrees}°`]);
+  }
+  facts.push(["speed", `${now.speed_m_s.toFixed(2)} m/s`]);
+  if (now.energy !== null) {
+    facts.push(["battery", `${Math.round(100 * now.energy)} %${now.is_charging ? ", charging" : ""}`]);
+  }
+  if (now.action) facts.push(["does", now.action]);
+  if (now.plan) facts.push(["plan", now.plan]);
+  children(byId("facts"), facts.map(([name, value]) =>
+    element("div", {}, [element("dt", {}, name), element("dd", {}, String(value))])));
+  byId("conscious").textContent = now.conscious ? `Conscious last: ${now.conscious}` : "";
+
+  if (!now.cycle && isLive) setStatus("no agent yet", "");
+  else if (now.halted_by) setStatus(`stands: ${now.halted_by}`, now.halted_by === "at goal" ? "good" : "bad");
+  else if (now.slowed_by) setStatus(`slowed: ${now.slowed_by}`, "");
+  else setStatus("drives", "good");
+}
+
+function setStatus(text, kind) {
+  const status = byId("status");
+  if (status.textContent !== text) status.textContent = text;
+  status.className = `pill ${kind}`;
+}
+
+function showPlaying(now) {
+  playing = now;
+  const slider = byId("time");
+  slider.max = now.duration_s;
+  if (!isSliding) slider.value = now.at_s;
+  const indexed = now.indexed_s < now.duration_s ? `, ${Math.round(100 * now.indexed_s / now.duration_s)} % read` : "";
+  byId("clock").textContent = `${now.at_s.toFixed(1)} of ${now.duration_s.toFixed(1)} s${indexed}`;
+  byId("play").textContent = now.is_playing ? "Pause" : "Play";
+  byId("play").setAttribute("aria-pressed", now.is_playing);
+}
+
+function showNames(objects) {
+  const names = [...new Set(objects.map((each) => each.name || each.label))].sort();
+  children(byId("names"), names.map((value) => element("option", { value })));
+}
+
+function showStreets(streets) {
+  const select = byId("street");
+  if (select.options.length === streets.length) return;
+  children(select, streets.map((each) => element("option", {}, each.name)));
+}
+
+async function wish(wanted) {
+  const answer = byId("answer");
+  const response = await fetch("/wish", {
+    method: "POST",
+    headers: { "Content-Type": "application/json" },
+    body: JSON.stringify(wanted),
+  });
+  answer.textContent = await response.text();
+  answer.className = response.ok ? "" : "bad";
+}
+
+byId("person").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const text = byId("goal").value.trim();
+  const place = text.split(/[\s,]+/).map(Number);
+  if (!text) return;
+  wish({ goal: place.length === 2 && place.every(Number.isFinite) ? place : text });
+});
+byId("clear").onclick = () => wish({ clear: true });
+byId("close").onclick = () => wish({ street: byId("street").value, closed: true });
+byId("open").onclick = () => wish({ street: byId("street").value, closed: false });
+byId("play").onclick = () => wish({ play: !playing.is_playing });
+byId("step").onclick = () => wish({ step: true });
+byId("speed").onchange = (event) => wish({ speed: Number(event.target.value) });
+byId("time").oninput = (event) => { isSliding = true; wish({ seek_s: Number(event.target.value) }); };
+byId("time").onchange = () => { isSliding = false; };
+byId("player").addEventListener("submit", (event) => event.preventDefault());
+
+connect();

@@ -1,0 +1,229 @@
+"""A log as the source of a dashboard: shown at any moment, or played."""
+
+from __future__ import annotations
+
+import threading
+import time
+from bisect import bisect_right
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import lz4.frame
+
+from cogmap.bus.codec import decode, encode
+from cogmap.cli.dashboard.received import Arrived, Received
+from cogmap.cli.dashboard.scene import FOLLOWED, Scene
+from cogmap.cli.dashboard.source import Playing, Wish
+from cogmap.errors import LogError, MessageError, UsageError
+from cogmap.graph.graph import Graph
+from cogmap.recording.log import recorded_config
+from cogmap.recording.storage.reader import LogReader, Record
+from cogmap.runtime import config
+from cogmap.schemas import topics
+from cogmap.schemas.graph import Delta, Snapshot
+from cogmap.services.global_workspace.config import Config
+
+KEYFRAME_S = 5.0
+"""A moment is shown by the keyframe before it and what follows: some 100 ms of a town's log."""
+
+VIEW_BACK_S = 2.0
+"""The view of a moment is looked for so far back."""
+
+TICK_S = 0.05
+SPEEDS = (0.1, 100.0)
+_SMALL = tuple(topic for topic in FOLLOWED if not topic.carries_images)
+
+
+@dataclass(frozen=True)
+class Keyframe:
+    """All that is shown at `at_ns` of the log: the graph as compressed bytes, and the rest."""
+
+    at_ns: int
+    graph: bytes
+    received: Received
+
+
+class Playback:
+    """The log at `path`, from its beginning. Keyframes are made in the background; a moment can be
+    shown once they have come so far. Raises LogError if it cannot be read.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._reader = LogReader(path)
+        self.label = str(self._reader.path)
+        self.lock = threading.Lock()
+        self._settings = config.recorded(recorded_config(self._reader), "global_workspace", Config)
+        self.scene = self._new_scene()
+
+        self._begin_ns, self._end_ns = self._reader.span_ns
+        self._at_ns = self._begin_ns
+        self._keyframes = [self._keyframe(self.scene, self._begin_ns)]
+        self._is_playing = False
+        self._speed = 1.0
+        self._seek_ns: int | None = self._begin_ns
+        self._steps = 0
+        self._changed = threading.Event()
+        self._has_ended = False
+        self._failure = ""
+        self._threads = [
+            threading.Thread(target=work, daemon=True) for work in (self._index, self._play)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def playing(self) -> Playing:
+        """Return how far it is played."""
+        return Playing(
+            at_s=self._seconds(self._at_ns),
+            duration_s=self._seconds(self._end_ns),
+            indexed_s=self._seconds(self._keyframes[-1].at_ns),
+            is_playing=self._is_playing,
+            speed=self._speed,
+        )
+
+    def watched(self, by: int) -> None:
+        """Do nothing: who does not watch does not play."""
+
+    def act(self, wish: Wish) -> str:
+        """Play, stop, step, or show another moment. Raises UsageError for what a log cannot do."""
+        if self._failure:
+            raise UsageError(self._failure)
+        if wish.seek_s is not None:
+            wanted_ns = self._begin_ns + round(max(0.0, wish.seek_s) * 1e9)
+            self._seek_ns = min(wanted_ns, self._end_ns)
+            done = f"{self._seconds(self._seek_ns):.1f} s into the log"
+        elif wish.play is not None:
+            self._is_playing = wish.play
+            done = "playing" if wish.play else "paused"
+        elif wish.step:
+            self._is_playing = False
+            self._steps += 1
+            done = "one cycle on"
+        elif wish.speed is not None:
+            slowest, fastest = SPEEDS
+            self._speed = min(max(wish.speed, slowest), fastest)
+            done = f"{self._speed:g} times as fast as it was"
+        else:
+            raise UsageError("nothing can be done in a log: it is over")
+        self._changed.set()
+        return done
+
+    def close(self) -> None:
+        """End what goes on in the background."""
+        self._has_ended = True
+        self._changed.set()
+        for thread in self._threads:
+            thread.join()
+
+    def _seconds(self, at_ns: int) -> float:
+        return (at_ns - self._begin_ns) / 1e9
+
+    def _new_scene(self) -> Scene:
+        graph = Graph()
+
+        def follow(delta: Delta, _incarnation: int | None) -> None:
+            graph.apply(delta)
+
+        return Scene(graph, follow, self._settings, Path(self.label))
+
+    def _keyframe(self, scene: Scene, at_ns: int) -> Keyframe:
+        content = lz4.frame.compress(encode(scene.graph.snapshot()))
+        return Keyframe(at_ns, content, scene.received.copy())
+
+    def _index(self) -> None:
+        """Go through the log once, and leave a keyframe every KEYFRAME_S."""
+        reader = LogReader(self._reader.path)
+        scene = self._new_scene()
+        due_ns = self._begin_ns + round(KEYFRAME_S * 1e9)
+        try:
+            for record in reader.records(_SMALL):
+                if self._has_ended:
+                    return
+                while record.log_time_ns >= due_ns:
+                    self._keyframes.append(self._keyframe(scene, due_ns))
+                    due_ns += round(KEYFRAME_S * 1e9)
+                _take(scene, reader, record)
+        except LogError as error:
+            self._failure = str(error)
+        self._keyframes.append(self._keyframe(scene, self._end_ns + 1))
+
+    def _play(self) -> None:
+        """Show what is asked for, and go on while it plays."""
+        coming = self._records(self._begin_ns)
+        last_s = time.monotonic()
+        while not self._has_ended:
+            if self._seek_ns is not None:
+                wanted_ns = self._seek_ns
+                self._seek_ns = None
+                coming = self._show(wanted_ns)
+                self._steps = 0
+            elif self._steps:
+                self._steps -= 1
+                coming = self._advance(coming, self._end_ns, self.scene.graph.cycle + 1)
+
+            now_s = time.monotonic()
+            if self._is_playing:
+                passed_ns = round((now_s - last_s) * self._speed * 1e9)
+                until_ns = min(self._at_ns + passed_ns, self._end_ns)
+                coming = self._advance(coming, until_ns)
+                self._is_playing = self._at_ns < self._end_ns
+            last_s = now_s
+            self._changed.wait(TICK_S if self._is_playing else None)
+            self._changed.clear()
+
+    def _records(self, since_ns: int) -> Iterator[Record]:
+        return self._reader.records(FOLLOWED, start_ns=since_ns)
+
+    def _show(self, at_ns: int) -> Iterator[Record]:
+        """Show the moment `at_ns`. Returns the records that follow it."""
+        times_ns = [keyframe.at_ns for keyframe in self._keyframes]
+        keyframe = self._keyframes[max(0, bisect_right(times_ns, at_ns) - 1)]
+        snapshot = decode(topics.SNAPSHOT, lz4.frame.decompress(keyframe.graph))
+        assert isinstance(snapshot, Snapshot)
+
+        scene = self._new_scene()
+        scene.graph.load(snapshot)
+        scene.received = keyframe.received.copy()
+        between = self._reader.records(_SMALL, start_ns=keyframe.at_ns, end_ns=at_ns + 1)
+        for record in between:
+            _take(scene, self._reader, record)
+        back_ns = max(self._begin_ns, at_ns - round(VIEW_BACK_S * 1e9))
+        views = list(self._reader.records([topics.VIEW], start_ns=back_ns, end_ns=at_ns + 1))
+        if views:
+            _take(scene, self._reader, views[-1])
+
+        with self.lock:
+            scene.follow_on(self.scene)
+            self.scene = scene
+            self._at_ns = at_ns
+        return self._records(at_ns + 1)
+
+    def _advance(
+        self, coming: Iterator[Record], until_ns: int, cycle: int | None = None
+    ) -> Iterator[Record]:
+        """Take account of what is received up to `until_ns`, or to the end of `cycle`. Returns the
+        records that follow.
+        """
+        for record in coming:
+            if record.log_time_ns > until_ns:
+                until_ns = max(until_ns, self._at_ns)
+                break
+            with self.lock:
+                _take(self.scene, self._reader, record)
+                self._at_ns = record.log_time_ns
+            if cycle is not None and self.scene.graph.cycle > cycle:
+                until_ns = record.log_time_ns
+                break
+        self._at_ns = until_ns
+        return self._records(until_ns + 1)
+
+
+def _take(scene: Scene, reader: LogReader, record: Record) -> None:
+    """Have a scene take account of a message of the log; one that cannot be read is left out."""
+    try:
+        message = reader.message(record)
+    except MessageError:
+        return
+    scene.take(record.topic, Arrived(message, record.envelope, record.log_time_ns))

@@ -1,0 +1,225 @@
+"""Serves the page of the dashboard: its files, what is new of each part, pictures, wishes."""
+
+from __future__ import annotations
+
+import asyncio
+import ipaddress
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import msgspec
+from aiohttp import WSMsgType, web
+
+from cogmap.cli.dashboard import pictures
+from cogmap.cli.dashboard.parts import PartName
+from cogmap.cli.dashboard.source import Source, Wish
+from cogmap.errors import CogmapError
+from cogmap.schemas import topics
+from cogmap.schemas.render import to_text
+from cogmap.schemas.sensing import View
+
+PAGE = Path(__file__).parent / "page"
+PERIOD_S = 0.1
+"""A browser is told what is new at most so often, and never before it has shown the last."""
+
+LOOK_S = 0.02
+MADE_ANEW_S = {
+    PartName.MAP: 0.5,
+    PartName.MIND: 0.2,
+    PartName.SYSTEM: 0.5,
+    PartName.TOPICS: 0.5,
+    PartName.TRUTH: 1.0,
+}
+"""How often a part is made anew at most: what changes slowly costs little."""
+
+MAX_REQUEST_BYTES = 64 * 1024
+MAX_TEXT = 20_000
+HEADERS = {
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob:; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+}
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Asked(msgspec.Struct, kw_only=True):
+    """What a browser asks for: what is newer than what it has, and a message of `topic`."""
+
+    have: dict[PartName, int] = {}
+    topic: str = ""
+
+
+class Made(msgspec.Struct, kw_only=True):
+    """A part as it was made last."""
+
+    version: int
+    content: msgspec.Raw
+    made_s: float
+
+
+class Dashboard:
+    """The dashboard of `source`, for browsers that reach it by an address, as localhost, or by the
+    name `host`.
+    """
+
+    def __init__(self, source: Source, host: str) -> None:
+        self._source = source
+        self._names = {"localhost", host}
+        self._made: dict[PartName, Made] = {}
+        self._pictures: dict[str, tuple[object, bytes]] = {}
+        self._browsers = 0
+
+    def application(self) -> web.Application:
+        """Return what is to be served."""
+        guards = [self._only_for_own_page]
+        app = web.Application(middlewares=guards, client_max_size=MAX_REQUEST_BYTES)
+        app.add_routes(
+            [
+                web.get("/", _index),
+                web.get("/news", self._news),
+                web.get("/view.jpg", self._view),
+                web.get("/depth.jpg", self._depth),
+                web.get("/places.png", self._places),
+                web.post("/wish", self._wish),
+                web.static("/page", PAGE),
+            ]
+        )
+        return app
+
+    @web.middleware
+    async def _only_for_own_page(
+        self, request: web.Request, handler: Handler
+    ) -> web.StreamResponse:
+        """Refuse what another site's page asks for in the name of whoever looks at it, also where
+        that site's name leads here.
+        """
+        name = request.url.host or ""
+        origin = request.headers.get("Origin", f"http://{request.host}")
+        if origin != f"http://{request.host}" or not (name in self._names or _is_address(name)):
+            raise web.HTTPForbidden(text="This is a dashboard for its own page alone.")
+        response = await handler(request)
+        if not response.prepared:
+            response.headers.update(HEADERS)
+        return response
+
+    async def _news(self, request: web.Request) -> web.WebSocketResponse:
+        """Answer each request of a browser once something is new for it."""
+        socket = web.WebSocketResponse(heartbeat=20.0, max_msg_size=MAX_REQUEST_BYTES)
+        await socket.prepare(request)
+        self._browsers += 1
+        self._source.watched(self._browsers)
+        try:
+            async for received in socket:
+                if received.type is not WSMsgType.TEXT:
+                    break
+                asked = msgspec.json.decode(received.data, type=Asked)
+                began_s = time.monotonic()
+                await socket.send_bytes(await self._newer(asked))
+                await asyncio.sleep(max(0.0, began_s + PERIOD_S - time.monotonic()))
+        except (msgspec.MsgspecError, ConnectionError):
+            pass  # it went away, or is no page of ours
+        finally:
+            self._browsers -= 1
+            self._source.watched(self._browsers)
+        return socket
+
+    async def _newer(self, asked: Asked) -> bytes:
+        """Wait until a part is newer than what a browser has, and return all those."""
+        waited_s = 0.0
+        while True:
+            found = await asyncio.to_thread(self._parts, asked)
+            if found or waited_s >= 1.0:
+                break
+            await asyncio.sleep(LOOK_S)
+            waited_s += LOOK_S
+
+        news = {
+            "label": self._source.label,
+            "playing": self._source.playing,
+            "parts": {name: {"version": m.version, "content": m.content} for name, m in found},
+            "message": self._message(asked.topic),
+        }
+        return msgspec.json.encode(news)
+
+    def _parts(self, asked: Asked) -> list[tuple[PartName, Made]]:
+        """Make what is newer than what a browser has, and not made too short a time ago."""
+        source = self._source
+        found = []
+        now_s = time.monotonic()
+        for name in PartName:
+            made = self._made.get(name)
+            version = source.scene.versions[name]
+            is_old = made is None or now_s - made.made_s >= MADE_ANEW_S.get(name, 0.0)
+            if is_old and (made is None or made.version != version):
+                with source.lock:
+                    version = source.scene.versions[name]
+                    part = source.scene.part(name)
+                content = msgspec.Raw(msgspec.json.encode(part))
+                made = self._made[name] = Made(version=version, content=content, made_s=now_s)
+            if made is not None and made.version != asked.have.get(name):
+                found.append((name, made))
+        return found
+
+    def _message(self, name: str) -> dict[str, str] | None:
+        """Return the newest message of a topic as text; None if there is none."""
+        topic = topics.BY_NAME.get(name)
+        message = None if topic is None else self._source.scene.received.message(topic)
+        if message is None:
+            return None
+        return {"topic": name, "text": to_text(message)[:MAX_TEXT]}
+
+    async def _view(self, request: web.Request) -> web.Response:
+        return await self._picture("view", "image/jpeg", pictures.view_jpeg)
+
+    async def _depth(self, request: web.Request) -> web.Response:
+        return await self._picture("depth", "image/jpeg", pictures.depth_jpeg)
+
+    async def _picture(self, name: str, kind: str, draw: Callable[[View], bytes]) -> web.Response:
+        """Return a picture of the newest view, which is drawn once for all browsers."""
+        view = self._source.scene.received.message(topics.VIEW)
+        if not isinstance(view, View):
+            raise web.HTTPNotFound(text="There is no view.")
+
+        drawn = self._pictures.get(name)
+        if drawn is None or drawn[0] is not view:
+            drawn = self._pictures[name] = (view, await asyncio.to_thread(draw, view))
+        return web.Response(body=drawn[1], content_type=kind)
+
+    async def _places(self, request: web.Request) -> web.Response:
+        """Return the picture of place nodes."""
+
+        def draw() -> bytes:
+            with self._source.lock:
+                return pictures.places_png(self._source.scene.graph)
+
+        version = request.query.get("v", "")
+        drawn = self._pictures.get("places")
+        if drawn is None or drawn[0] != version:
+            drawn = self._pictures["places"] = (version, await asyncio.to_thread(draw))
+        return web.Response(body=drawn[1], content_type="image/png")
+
+    async def _wish(self, request: web.Request) -> web.Response:
+        """Do what a person wishes, and say what was done, or why not."""
+        if request.content_type != "application/json":
+            raise web.HTTPUnsupportedMediaType(text="A wish is JSON.")
+        try:
+            wish = msgspec.json.decode(await request.read(), type=Wish)
+            done = await asyncio.to_thread(self._source.act, wish)
+        except (msgspec.MsgspecError, CogmapError) as error:
+            return web.Response(status=400, text=str(error))
+        return web.Response(text=done)
+
+
+def _is_address(name: str) -> bool:
+    """Return whether a host is given by its address: no other site's name leads to it."""
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+async def _index(_request: web.Request) -> web.FileResponse:
+    return web.FileResponse(PAGE / "index.html")

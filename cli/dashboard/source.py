@@ -1,0 +1,64 @@
+"""Where a scene comes from: a running system, or a log."""
+
+from __future__ import annotations
+
+import threading
+from typing import Protocol
+
+import msgspec
+
+from cogmap.cli.dashboard.scene import Scene
+
+
+class Playing(msgspec.Struct, kw_only=True):
+    """How a log is played: at which time, of how much; `indexed_s` of it can be shown already."""
+
+    at_s: float
+    duration_s: float
+    indexed_s: float
+    is_playing: bool
+    speed: float
+
+
+class Source(Protocol):
+    """What the server shows: whoever looks at `scene` holds `lock`.
+
+    `label` says what it is. A log is `playing`; it is None of a running system.
+    """
+
+    scene: Scene
+    lock: threading.Lock
+    label: str
+
+    @property
+    def playing(self) -> Playing | None:
+        """Return how far a log is played."""
+
+    def watched(self, by: int) -> None:
+        """Learn that so many browsers watch."""
+
+    def act(self, wish: Wish) -> str:
+        """Do what a person wishes. Returns a sentence on what was done; raises UsageError if it
+        cannot be.
+        """
+
+    def close(self) -> None:
+        """End what goes on in the background."""
+
+
+class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
+    """What a person wants done; one of its fields is given.
+
+    `goal` is an object's name, or x and y on the map; `clear` forgets all goals. `street` is to be
+    `closed` or opened. Of a log: `seek_s` is a time to show, `play` whether it is to go on, `step`
+    asks for the next cycle, `speed` is how fast it plays.
+    """
+
+    goal: str | tuple[float, float] | None = None
+    clear: bool = False
+    street: str = ""
+    closed: bool = True
+    seek_s: float | None = None
+    play: bool | None = None
+    step: bool = False
+    speed: float | None = None
