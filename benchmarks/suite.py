@@ -16,6 +16,7 @@ from benchmarks.benchmark import PROCESSES, Benchmark, Setting
 from benchmarks.bus import measure as bus
 from benchmarks.cognition import measure as cognition
 from benchmarks.cycle import measure as cycle
+from benchmarks.dashboard import measure as dashboard
 from benchmarks.explore import measure as explore
 from benchmarks.individuals import measure as individuals
 from benchmarks.learning import measure as learning
@@ -157,6 +158,7 @@ SUITE = (
     Benchmark("memory", memory.THRESHOLDS, memory.measure, options=[PROCESSES]),
     Benchmark("learning", learning.THRESHOLDS, learning.measure, options=[PROCESSES]),
     Benchmark("lifelong", lifelong.THRESHOLDS, lifelong.measure, options=lifelong.OPTIONS),
+    Benchmark("dashboard", dashboard.THRESHOLDS, dashboard.measure, options=dashboard.OPTIONS),
     Benchmark("log_api", log_api.THRESHOLDS, log_api.measure, options=log_api.OPTIONS),
     Benchmark(
         "cue-integration",

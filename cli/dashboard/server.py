@@ -6,6 +6,7 @@ import asyncio
 import ipaddress
 import time
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
@@ -13,6 +14,7 @@ from aiohttp import WSMsgType, web
 
 from cogmap.cli.dashboard import pictures
 from cogmap.cli.dashboard.parts import PartName
+from cogmap.cli.dashboard.scene import Scene
 from cogmap.cli.dashboard.source import Source, Wish
 from cogmap.errors import CogmapError
 from cogmap.schemas import topics
@@ -51,9 +53,11 @@ class Asked(msgspec.Struct, kw_only=True):
     topic: str = ""
 
 
-class Made(msgspec.Struct, kw_only=True):
-    """A part as it was made last."""
+@dataclass(frozen=True)
+class Made:
+    """A part as it was made last, of `scene`."""
 
+    scene: Scene
     version: int
     content: msgspec.Raw
     made_s: float
@@ -129,6 +133,7 @@ class Dashboard:
         """Wait until a part is newer than what a browser has, and return all those."""
         waited_s = 0.0
         while True:
+            playing = self._source.playing
             found = await asyncio.to_thread(self._parts, asked)
             if found or waited_s >= 1.0:
                 break
@@ -137,7 +142,7 @@ class Dashboard:
 
         news = {
             "label": self._source.label,
-            "playing": self._source.playing,
+            "playing": playing,
             "parts": {name: {"version": m.version, "content": m.content} for name, m in found},
             "message": self._message(asked.topic),
         }
@@ -145,22 +150,31 @@ class Dashboard:
 
     def _parts(self, asked: Asked) -> list[tuple[PartName, Made]]:
         """Make what is newer than what a browser has, and not made too short a time ago."""
-        source = self._source
         found = []
-        now_s = time.monotonic()
         for name in PartName:
             made = self._made.get(name)
-            version = source.scene.versions[name]
-            is_old = made is None or now_s - made.made_s >= MADE_ANEW_S.get(name, 0.0)
-            if is_old and (made is None or made.version != version):
-                with source.lock:
-                    version = source.scene.versions[name]
-                    part = source.scene.part(name)
-                content = msgspec.Raw(msgspec.json.encode(part))
-                made = self._made[name] = Made(version=version, content=content, made_s=now_s)
-            if made is not None and made.version != asked.have.get(name):
+            if made is None or self._is_due(name, made):
+                made = self._made[name] = self._make(name)
+            if made.version != asked.have.get(name):
                 found.append((name, made))
         return found
+
+    def _is_due(self, name: PartName, made: Made) -> bool:
+        """Decide whether a part is to be made anew: of another moment of a log at once."""
+        scene = self._source.scene
+        if made.scene is not scene:
+            return True
+
+        age_s = time.monotonic() - made.made_s
+        return made.version != scene.versions[name] and age_s >= MADE_ANEW_S.get(name, 0.0)
+
+    def _make(self, name: PartName) -> Made:
+        with self._source.lock:
+            scene = self._source.scene
+            version = scene.versions[name]
+            part = scene.part(name)
+        content = msgspec.Raw(msgspec.json.encode(part))
+        return Made(scene, version, content, time.monotonic())
 
     def _message(self, name: str) -> dict[str, str] | None:
         """Return the newest message of a topic as text; None if there is none."""

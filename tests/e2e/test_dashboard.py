@@ -11,9 +11,10 @@ from urllib.parse import urlsplit
 from urllib.request import urlopen
 
 import pytest
+from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
-from selenium.webdriver.remote.webdriver import WebDriver
 
+from benchmarks.dashboard.browser import foreign_requests
 from cogmap.bus.codec import decode
 from cogmap.bus.interface import Arrival
 from cogmap.bus.zenoh_bus import ZenohBus
@@ -21,7 +22,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.nodes import Goal
 from tests.support.reference import REFERENCE
-from tests.support.system.browser import await_script, browser, errors, faults, foreign_requests
+from tests.support.system.browser import await_script, browser, errors, faults
 from tests.support.system.processes import wait_until
 from tests.support.system.runs import COGMAP, DRIVING, TIMEOUT_S, Run
 
@@ -93,7 +94,7 @@ slider.dispatchEvent(new Event('change'));
 """
 
 
-def show_end(page: WebDriver) -> None:
+def show_end(page: Chrome) -> None:
     """Move the slider of a log to its end."""
     await_script(page, "return document.getElementById('time').max > 1", "the slider is there")
     page.execute_script(SLIDE_TO_END)
