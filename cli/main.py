@@ -36,7 +36,7 @@ VERBS = {
     "router": ("cogmap.cli.processes:router", "Run the router that all modules connect to."),
     "run": ("cogmap.cli.run.command:run", "Drive through a simulated town, or play a recording."),
     "schemes": ("cogmap.cli.schemes:schemes", "Write the guidance schemes learned on a drive."),
-    "street": ("cogmap.cli.street:street", "Close and open streets of the simulated town."),
+    "street": ("cogmap.cli.street:street", "List, close and open streets of the town."),
     "topic": ("cogmap.cli.topic.command:topic", "Watch topics of a running system; publish."),
     "train": ("cogmap.training.command:train", "Train the networks of perception."),
 }

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from cogmap.cli.street import is_as_asked
+import pytest
+
+from cogmap.bus.memory import MemoryBus, MemoryNetwork
+from cogmap.cli.street import Towns, check_known, is_as_asked
+from cogmap.errors import NoAnswerError, UsageError
 from cogmap.schemas.sensing import Street, StreetClosure, TrueTown
 
 
@@ -28,3 +32,18 @@ def test_a_town_without_the_street_answers_nothing() -> None:
     for closed in (True, False):
         closure = StreetClosure(street="Nowhere 1", closed=closed)
         assert not is_as_asked(_town(), closure)
+
+
+def test_a_street_that_the_town_does_not_have_is_refused_with_what_may_be_meant() -> None:
+    check_known(_town(), "Elm Street 1")
+    with pytest.raises(UsageError, match="'Elm Street 1'"):
+        check_known(_town(), "Elm Street 11")
+    with pytest.raises(UsageError, match="cogmap street list"):
+        check_known(_town(), "Qxyz")
+
+
+def test_without_a_simulation_the_remedy_is_named() -> None:
+    towns = Towns(MemoryBus(MemoryNetwork()))
+
+    with pytest.raises(NoAnswerError, match="cogmap run"):
+        towns.next(0.0)
