@@ -12,11 +12,12 @@ import msgspec
 import tomli_w
 
 from cogmap.cli.launch.plan import Choices, effective
-from cogmap.cli.options import config_option, json_option, set_option
+from cogmap.cli.options import json_option
 from cogmap.cli.run.options import codelets_option, laps_option, lockstep_option, seed_option
 from cogmap.errors import UsageError
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
+from cogmap.runtime.program import config_option, set_option
 from cogmap.services import registry
 
 COLUMNS = 100

@@ -8,9 +8,10 @@ from typing import Any
 import click
 
 from cogmap.bus.discovery import Process, Role, System
-from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.options import json_option
 from cogmap.cli.topic.observing import inspect_system
 from cogmap.errors import UsageError
+from cogmap.runtime.program import agent_option, connect_option
 from cogmap.schemas.topics import Topic
 
 VERBS = {Role.PUBLISHES: "publishes", Role.SUBSCRIBES: "subscribes", Role.ANSWERS: "answers"}

@@ -8,11 +8,12 @@ import threading
 import click
 import msgspec
 
-from cogmap.cli.options import agent_option, connect_option, json_option, wait_option
+from cogmap.cli.options import json_option, wait_option
 from cogmap.errors import NoAnswerError, UsageError
 from cogmap.graph.graph import Graph
 from cogmap.runtime.client import Client
 from cogmap.runtime.module import Module
+from cogmap.runtime.program import agent_option, connect_option
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer

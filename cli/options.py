@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 import click
-
-from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name
 
 
 class FiniteRange(click.FloatRange):
@@ -26,43 +23,6 @@ class FiniteRange(click.FloatRange):
 DASHBOARD_PORT = 8470
 """Where a dashboard serves, if that is free."""
 
-connect_option = click.option(
-    "--connect",
-    default=DEFAULT_ENDPOINT,
-    show_default=True,
-    envvar="COGMAP_CONNECT",
-    help="Where the router listens.",
-)
-
-
-def _checked(context: click.Context, option: click.Parameter, name: str) -> str:
-    """Refuse a name that cannot be part of a key. Raises UsageError."""
-    check_name("--agent", name)
-    return name
-
-
-agent_option = click.option(
-    "--agent",
-    callback=_checked,
-    default=DEFAULT_AGENT,
-    show_default=True,
-    envvar="COGMAP_AGENT",
-    help="The agent whose topics are meant, if several share a bus.",
-)
-config_option = click.option(
-    "--config",
-    "config_path",
-    type=click.Path(path_type=Path),
-    envvar="COGMAP_CONFIG",
-    help="A file of settings in TOML, as `cogmap config` prints it.",
-)
-set_option = click.option(
-    "--set",
-    "settings",
-    multiple=True,
-    metavar="MODULE.KEY=VALUE",
-    help="Override one setting; may be repeated.",
-)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 wait_option = click.option(
     "--wait",

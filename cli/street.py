@@ -8,7 +8,7 @@ from contextlib import suppress
 import click
 
 from cogmap.bus.interface import Arrival, Bus
-from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.options import json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.topic.observing import observing
 from cogmap.cli.topic.pub import Publisher
@@ -16,6 +16,7 @@ from cogmap.errors import NoAnswerError, UsageError
 from cogmap.hints import did_you_mean
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.program import agent_option, connect_option
 from cogmap.schemas import topics
 from cogmap.schemas.sensing import StreetClosure, TrueTown
 

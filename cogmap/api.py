@@ -1,8 +1,8 @@
 """What a module of one's own and a notebook need; `import cogmap` gives these names.
 
-A module:       Module, topics, run_module; its messages are in `cogmap.schemas`
+A module:       Module, topics, run_program; its messages are in `cogmap.schemas`
 The map:        Graph, Replica, snapshot_over (Module.following is the short form)
-Running:        InProcessRunner in one process; Client beside a running system
+Running:        InProcessRunner in one process; Client beside a running system; run_module
 A codelet:      Codelet, CycleContext, Answer; its tasks and nodes are in `cogmap.schemas`
 Recorded logs:  open_log, Log, Entry
 Errors:         CogmapError and its kinds
@@ -29,6 +29,7 @@ from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.runtime.process import run_module
+from cogmap.runtime.program import run_program
 from cogmap.schemas import topics
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     "UsageError",
     "open_log",
     "run_module",
+    "run_program",
     "snapshot_over",
     "topics",
 ]

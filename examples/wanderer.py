@@ -1,6 +1,7 @@
 """A module that drives by the range scan alone, in the place of `motor`.
 
-Run it beside the others: `cogmap run --without motor`, and `python examples/wanderer.py`.
+Run it beside the others: `cogmap run --without motor`, and `python examples/wanderer.py`; `--help`
+lists its options.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from typing import Annotated
 import msgspec
 import numpy as np
 
-from cogmap import MessageError, Module, run_module, topics
+from cogmap import MessageError, Module, run_program, topics
 from cogmap.schemas.sensing import MotorCommand, RangeScan
 
 AHEAD_RAD = 0.3
@@ -57,7 +58,7 @@ class Wanderer:
         )
 
 
-def build(config: Config, instance: str = "motor") -> Module:
+def build(config: Config, instance: str = "") -> Module:
     """Build the module `motor`, by range scan alone."""
     wanderer = Wanderer(config)
     module = Module("motor", instance)
@@ -65,4 +66,4 @@ def build(config: Config, instance: str = "motor") -> Module:
 
 
 if __name__ == "__main__":
-    run_module(build(Config()))
+    run_program(build, Config, "wanderer")

@@ -14,9 +14,10 @@ from cogmap.cli.dashboard.live import Live
 from cogmap.cli.dashboard.playback import Playback
 from cogmap.cli.dashboard.server import Dashboard
 from cogmap.cli.dashboard.source import Source
-from cogmap.cli.options import DASHBOARD_PORT, agent_option, connect_option
+from cogmap.cli.options import DASHBOARD_PORT
 from cogmap.errors import PortInUseError
 from cogmap.runtime.process import Stop
+from cogmap.runtime.program import agent_option, connect_option, tied_option
 
 LOOK_S = 0.1
 
@@ -38,7 +39,7 @@ LOOK_S = 0.1
     help="The port to serve at; 0 for one that is free.",
 )
 @click.option("--open", "opens", is_flag=True, help="Open it in a browser.")
-@click.option("--tied", is_flag=True, help="End when standard input is closed.")
+@tied_option
 @connect_option
 @agent_option
 def dashboard(

@@ -16,11 +16,12 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.doctor import installation, system
 from cogmap.cli.doctor.finding import Finding
 from cogmap.cli.doctor.system import Observed
-from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.options import json_option
 from cogmap.cli.topic.observing import observing
 from cogmap.errors import NoRouterError
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.program import agent_option, connect_option
 from cogmap.schemas import topics
 from cogmap.services import registry
 

@@ -10,19 +10,19 @@ import click
 
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.log.report import print_summary
-from cogmap.cli.options import (
-    FiniteRange,
-    agent_option,
-    config_option,
-    connect_option,
-    json_option,
-    set_option,
-)
+from cogmap.cli.options import FiniteRange, json_option
 from cogmap.cli.printing import print_json
 from cogmap.errors import LogError
 from cogmap.recording import recorder, selection
 from cogmap.runtime import config
 from cogmap.runtime.process import Stop, give_way
+from cogmap.runtime.program import (
+    agent_option,
+    config_option,
+    connect_option,
+    set_option,
+    tied_option,
+)
 
 _EPILOG = """\b
 Examples:
@@ -56,7 +56,7 @@ Examples:
     show_default=True,
     help="A name of its own, if several processes record.",
 )
-@click.option("--tied", is_flag=True, help="End when standard input is closed.")
+@tied_option
 @connect_option
 @agent_option
 @config_option

@@ -10,14 +10,7 @@ import click
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.log import report
 from cogmap.cli.log.keys import Keys
-from cogmap.cli.options import (
-    FiniteRange,
-    agent_option,
-    config_option,
-    connect_option,
-    json_option,
-    set_option,
-)
+from cogmap.cli.options import FiniteRange, json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.progress import bar
 from cogmap.recording import selection
@@ -26,6 +19,7 @@ from cogmap.recording.replaying.replay import replay_into
 from cogmap.recording.storage.reader import LogReader
 from cogmap.runtime import config
 from cogmap.runtime.process import Stop
+from cogmap.runtime.program import agent_option, config_option, connect_option, set_option
 from cogmap.services import registry
 
 CLOCK_HZ = 40.0

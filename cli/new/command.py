@@ -16,7 +16,7 @@ TEMPLATES = Path(__file__).parent / "templates"
 PROJECT_MARK = Path("services") / "registry.py"
 PUBLIC_IMPORTS = {
     "codelet": "from cogmap import Answer, Codelet, CycleContext, Graph",
-    "module": "from cogmap import Graph, MessageError, Module, run_module, topics",
+    "module": "from cogmap import Graph, MessageError, Module, run_program, topics",
     "module_test": "from cogmap import MessageError",
 }
 OWN_IMPORTS = {
@@ -42,7 +42,7 @@ TEST_IMPORTS = {
 MAIN = """
 
 if __name__ == "__main__":
-    run_module(build(Config()))
+    run_program(build, Config, NAME)
 """
 
 

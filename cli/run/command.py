@@ -10,7 +10,7 @@ import click
 
 from cogmap.cli.launch.command_line import ONE_THREAD
 from cogmap.cli.launch.forking.client import fork_server
-from cogmap.cli.options import FiniteRange, agent_option, config_option, connect_option, set_option
+from cogmap.cli.options import FiniteRange
 from cogmap.cli.run.options import (
     LAP_LIMIT_S,
     codelets_option,
@@ -29,6 +29,7 @@ from cogmap.cli.run.options import (
     town_option,
 )
 from cogmap.runtime import config
+from cogmap.runtime.program import agent_option, config_option, connect_option, set_option
 from cogmap.services import registry
 
 

@@ -12,13 +12,14 @@ import click
 import msgspec
 
 from cogmap.bus.interface import Arrival
-from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.options import json_option
 from cogmap.cli.topic.argument import streamed_argument
 from cogmap.cli.topic.observing import TICK_S, RouterWatch, observing
 from cogmap.errors import UsageError
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.process import Stop
+from cogmap.runtime.program import agent_option, connect_option
 from cogmap.schemas.array import Array, Matrix
 from cogmap.schemas.base import Message
 from cogmap.schemas.render import field, to_jsonable, to_text

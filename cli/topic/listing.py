@@ -8,9 +8,10 @@ from typing import Any
 import click
 
 from cogmap.bus.discovery import Role, System
-from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.options import json_option
 from cogmap.cli.topic.argument import topic_argument
 from cogmap.cli.topic.observing import inspect_system
+from cogmap.runtime.program import agent_option, connect_option
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Delivery, Topic
 

@@ -9,12 +9,13 @@ import msgspec
 
 from cogmap.bus.codec import Envelope, decode, encode
 from cogmap.bus.zenoh_bus import ZenohBus
-from cogmap.cli.options import FiniteRange, agent_option, connect_option
+from cogmap.cli.options import FiniteRange
 from cogmap.cli.topic.argument import streamed_argument
 from cogmap.cli.topic.observing import CLI, RouterWatch, observing
 from cogmap.cli.topic.parse import parse
 from cogmap.errors import MessageError, UsageError
 from cogmap.runtime.process import Stop
+from cogmap.runtime.program import agent_option, connect_option
 from cogmap.schemas.base import Message
 from cogmap.schemas.topics import Topic
 

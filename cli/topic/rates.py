@@ -9,11 +9,12 @@ from typing import Any, TypeVar
 
 import click
 
-from cogmap.cli.options import agent_option, connect_option, json_option
+from cogmap.cli.options import json_option
 from cogmap.cli.topic.argument import streamed_argument
 from cogmap.cli.topic.observing import TICK_S, Receptions, RouterWatch, observing
 from cogmap.cli.topic.statistics import Bandwidth, Delay, Rate, Statistics
 from cogmap.runtime.process import Stop
+from cogmap.runtime.program import agent_option, connect_option
 from cogmap.schemas.topics import Topic
 
 REPORT_S = 1.0

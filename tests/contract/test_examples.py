@@ -7,7 +7,9 @@ import json
 import os
 import shutil
 import subprocess
+import sys
 import threading
+from os import environ
 from pathlib import Path
 from typing import Any
 
@@ -145,6 +147,26 @@ def test_a_module_of_msgpack_and_zenoh_alone_answers_scans(over_zenoh: OverZenoh
     finally:
         stop.set()
         thread.join()
+
+
+def test_the_module_as_a_program_takes_its_options_and_environment(over_zenoh: OverZenoh) -> None:
+    stage = Stage(over_zenoh)
+    command = [sys.executable, wanderer.__file__, "--set", "wanderer.cruise_rad_s=10"]
+    places = {"COGMAP_CONNECT": over_zenoh.endpoint, "COGMAP_AGENT": over_zenoh.agent}
+    process = subprocess.Popen([*command, "--set", "wanderer.clearance_m=4"], env=environ | places)
+    try:
+        stage.check_answers()
+    finally:
+        process.terminate()
+        process.wait(TIMEOUT_S)
+
+
+def test_a_setting_that_the_program_does_not_have_is_one_sentence() -> None:
+    command = [sys.executable, wanderer.__file__, "--set", "wanderer.cruise=10"]
+    run = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+
+    assert run.returncode == 2
+    assert run.stderr.startswith("wanderer: unknown key 'cruise' in [wanderer]")
 
 
 def test_the_module_in_rust_answers_scans(over_zenoh: OverZenoh) -> None:
