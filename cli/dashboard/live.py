@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections import Counter
@@ -121,7 +122,8 @@ class Connection:
         self._intake = Intake()
         self._numbers: Counter[Topic] = Counter()
         self._incarnation = time.time_ns()
-        bus.identify(Member(DASHBOARD, DASHBOARD))
+        self._name = f"{DASHBOARD}-{os.getpid()}"
+        bus.identify(Member(DASHBOARD, self._name))
         for topic in PUBLISHED:
             bus.declare(topic)
         for topic in FOLLOWED:
@@ -146,8 +148,8 @@ class Connection:
         number = self._numbers[topic]
         self._numbers[topic] += 1
         now_ns = time.time_ns()
-        envelope = Envelope(DASHBOARD, number, self._incarnation, now_ns, now_ns)
-        numbered = msgspec.structs.replace(message, source=DASHBOARD, seq=number)
+        envelope = Envelope(self._name, number, self._incarnation, now_ns, now_ns)
+        numbered = msgspec.structs.replace(message, source=self._name, seq=number)
         self._bus.publish(topic, encode(numbered), envelope)
 
 

@@ -63,6 +63,8 @@ class Playback:
         self._speed = 1.0
         self._seek_ns: int | None = self._begin_ns
         self._steps = 0
+        self._coming: Iterator[Record] = iter(())
+        self._next: Record | None = None
         self._changed = threading.Event()
         self._has_ended = False
         self._failure = ""
@@ -151,33 +153,28 @@ class Playback:
 
     def _play(self) -> None:
         """Show what is asked for, and go on while it plays."""
-        coming = self._records(self._begin_ns)
         last_s = time.monotonic()
         while not self._has_ended:
             if self._seek_ns is not None:
                 wanted_ns = self._seek_ns
                 self._seek_ns = None
-                coming = self._show(wanted_ns)
                 self._steps = 0
+                self._show(wanted_ns)
             elif self._steps:
                 self._steps -= 1
-                coming = self._advance(coming, self._end_ns, self.scene.graph.cycle + 1)
+                self._advance(self._end_ns, self.scene.graph.cycle + 1)
 
             now_s = time.monotonic()
             if self._is_playing:
                 passed_ns = round((now_s - last_s) * self._speed * 1e9)
-                until_ns = min(self._at_ns + passed_ns, self._end_ns)
-                coming = self._advance(coming, until_ns)
+                self._advance(min(self._at_ns + passed_ns, self._end_ns))
                 self._is_playing = self._at_ns < self._end_ns
             last_s = now_s
             self._changed.wait(TICK_S if self._is_playing else None)
             self._changed.clear()
 
-    def _records(self, since_ns: int) -> Iterator[Record]:
-        return self._reader.records(FOLLOWED, start_ns=since_ns)
-
-    def _show(self, at_ns: int) -> Iterator[Record]:
-        """Show the moment `at_ns`. Returns the records that follow it."""
+    def _show(self, at_ns: int) -> None:
+        """Show the moment `at_ns`, by the keyframe before it."""
         times_ns = [keyframe.at_ns for keyframe in self._keyframes]
         keyframe = self._keyframes[max(0, bisect_right(times_ns, at_ns) - 1)]
         snapshot = decode(topics.SNAPSHOT, lz4.frame.decompress(keyframe.graph))
@@ -194,30 +191,24 @@ class Playback:
         if views:
             _take(scene, self._reader, views[-1])
 
+        self._coming = self._reader.records(FOLLOWED, start_ns=at_ns + 1)
+        self._next = next(self._coming, None)
         with self.lock:
             scene.follow_on(self.scene)
             self.scene = scene
             self._at_ns = at_ns
-        return self._records(at_ns + 1)
 
-    def _advance(
-        self, coming: Iterator[Record], until_ns: int, cycle: int | None = None
-    ) -> Iterator[Record]:
-        """Take account of what is received up to `until_ns`, or to the end of `cycle`. Returns the
-        records that follow.
-        """
-        for record in coming:
-            if record.log_time_ns > until_ns:
-                until_ns = max(until_ns, self._at_ns)
-                break
+    def _advance(self, until_ns: int, cycle: int | None = None) -> None:
+        """Take account of what was received up to `until_ns`, or to the end of `cycle`."""
+        while self._next is not None and self._next.log_time_ns <= until_ns:
+            record = self._next
             with self.lock:
                 _take(self.scene, self._reader, record)
                 self._at_ns = record.log_time_ns
+            self._next = next(self._coming, None)
             if cycle is not None and self.scene.graph.cycle > cycle:
-                until_ns = record.log_time_ns
-                break
+                return
         self._at_ns = until_ns
-        return self._records(until_ns + 1)
 
 
 def _take(scene: Scene, reader: LogReader, record: Record) -> None:

@@ -39,7 +39,7 @@ def table(kind: type[Message], rows: Iterable[tuple[float, Message]]) -> pyarrow
     a struct of its dtype, shape and bytes; what may be of several types is JSON. Raises UsageError
     if there is no pyarrow.
     """
-    arrow = _pyarrow()
+    arrow = arrow_library()
     times_s: list[float] = []
     messages: list[Message] = []
     for time_s, message in rows:
@@ -69,7 +69,7 @@ def _columns(kind: type[msgspec.Struct], prefix: str) -> Iterator[tuple[str, _Ki
 
 def _kind(found: inspect.Type) -> _Kind:
     """Return how values of a type become Arrow's."""
-    arrow = _pyarrow()
+    arrow = arrow_library()
     kind = _Kind(arrow.string(), _json)
     match found:
         case inspect.BoolType():
@@ -111,14 +111,14 @@ def _or_none(kind: _Kind) -> _Kind:
 
 def _list_of(item: _Kind) -> _Kind:
     convert = list if item.convert is None else lambda values: [_made(item, one) for one in values]
-    return _Kind(_pyarrow().list_(item.type), convert)
+    return _Kind(arrow_library().list_(item.type), convert)
 
 
 def _map_of(key: _Kind, value: _Kind) -> _Kind:
     def pairs(values: dict[Any, Any]) -> object:
         return [(_made(key, name), _made(value, one)) for name, one in values.items()]
 
-    return _Kind(_pyarrow().map_(key.type, value.type), pairs)
+    return _Kind(arrow_library().map_(key.type, value.type), pairs)
 
 
 def _struct_of(fields: dict[str, _Kind]) -> _Kind:
@@ -126,14 +126,14 @@ def _struct_of(fields: dict[str, _Kind]) -> _Kind:
         return {name: _made(kind, getattr(whole, name)) for name, kind in fields.items()}
 
     types = [(name, kind.type) for name, kind in fields.items()]
-    return _Kind(_pyarrow().struct(types), parts)
+    return _Kind(arrow_library().struct(types), parts)
 
 
 def _array() -> _Kind:
     def parts(array: Array | Matrix) -> object:
         return {"dtype": array.dtype, "shape": list(array.shape), "data": bytes(array.data)}
 
-    arrow = _pyarrow()
+    arrow = arrow_library()
     shape = arrow.list_(arrow.int64())
     types = [("dtype", arrow.string()), ("shape", shape), ("data", arrow.binary())]
     return _Kind(arrow.struct(types), parts)
@@ -151,7 +151,8 @@ def _json(value: object) -> object:
     return msgspec.json.encode(value).decode()
 
 
-def _pyarrow() -> Any:
+def arrow_library() -> Any:
+    """Return pyarrow. Raises UsageError if it is not installed."""
     try:
         import pyarrow
     except ImportError:
