@@ -1,7 +1,7 @@
 """What a module of one's own and a notebook need; `import cogmap` gives these names.
 
 A module:       Module, topics, run_program; its messages are in `cogmap.schemas`
-The map:        Graph, Replica, snapshot_over (Module.following is the short form)
+The map:        Graph, near, as_networkx; Replica, snapshot_over (Module.following is shorter)
 Running:        InProcessRunner in one process; Client beside a running system; run_module
 A codelet:      Codelet, CycleContext, Answer; its tasks and nodes are in `cogmap.schemas`
 Recorded logs:  open_log, Log, Entry
@@ -22,6 +22,8 @@ from cogmap.errors import (
     UsageError,
 )
 from cogmap.graph.graph import Graph
+from cogmap.graph.individuals import near
+from cogmap.graph.network import as_networkx
 from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.recording import Entry, Log, open_log
 from cogmap.runtime.client import Client
@@ -52,6 +54,8 @@ __all__ = [
     "Replica",
     "StorageError",
     "UsageError",
+    "as_networkx",
+    "near",
     "open_log",
     "run_module",
     "run_program",

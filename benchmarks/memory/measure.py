@@ -34,7 +34,7 @@ def measure(setting: Setting) -> Metrics:
     houses by the houses passed. In ten towns a robot explores, and begins anew elsewhere with the
     map in memory, and with those of the nine other towns. Writers are killed, and databases cut
     short or flipped: `damaged_store_refused` counts those that were not refused although they had
-    changed. Takes a quarter of an hour on two cores.
+    changed. Takes three quarters of an hour on two cores.
     """
     announce = setting.announce
     announce("recall from corrupted cues")

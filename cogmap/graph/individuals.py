@@ -46,6 +46,26 @@ def called(name: str, graph: Graph) -> list[Object]:
     return given or [node for node in objects if node.look == name]
 
 
+def near(name: str, graph: Graph, within_m: float) -> list[tuple[float, Object]]:
+    """Return what stands within a distance of the objects that somebody means by a name, but these:
+    each with its distance in metres from the nearest of them, the nearest first.
+    """
+    meant = called(name, graph)
+    found = []
+    for node in graph.of_kind(Object):
+        if node in meant:
+            continue
+
+        away_m = [
+            math.dist((node.x_m, node.y_m), (each.x_m, each.y_m))
+            for each in meant
+            if each.map == node.map
+        ]
+        if away_m and min(away_m) <= within_m:
+            found.append((min(away_m), node))
+    return sorted(found, key=lambda item: (item[0], item[1].label))
+
+
 def shares(node: Object) -> dict[str, float]:
     """Return the share of each name in the evidence for all that an object may be called."""
     total = sum(node.names.values())

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from cogmap.bus.codec import Envelope, decode
 from cogmap.errors import LogError, MessageError
 from cogmap.graph.graph import Graph
+from cogmap.graph.path import rows_of
 from cogmap.recording import selection, table
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.format import MAX_TIME_NS
@@ -19,6 +20,7 @@ from cogmap.recording.storage.reader import LogReader, Record
 from cogmap.schemas import topics as topic_table
 from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta
+from cogmap.schemas.nodes import PathColumn
 from cogmap.schemas.topics import Topic
 
 if TYPE_CHECKING:
@@ -136,6 +138,17 @@ class Log:
 
         return table.table(chosen.type, rows())
 
+    def path_frame(self, time_s: float | None = None) -> pyarrow.Table:
+        """Return the agent's path as it believed it at `time_s` into the log, at its end if that is
+        not given: a row a place, a column for each PathColumn, such as `x_m`.
+
+        Raises as `graph_at` does, and UsageError if there is no pyarrow.
+        """
+        arrow = table.arrow_library()
+        graph = self.graph_at(self.duration_s if time_s is None else time_s)
+        rows = rows_of(graph.path)
+        return arrow.table({column.name.lower(): rows[:, column] for column in PathColumn})
+
     def last(self, topic: str | Topic, holds: Callable[[Any], bool]) -> Entry | None:
         """Return the last message on `topic` for which `holds` is true; None if it is for none.
 
@@ -214,6 +227,7 @@ def open_log(path: Path | str) -> Log:
             for entry in log.messages("odometry", start_s=2.0, end_s=4.0):
                 print(entry.time_s, entry.message.speed_m_s)
             print(log.frame("truth/pose").to_pandas())
+            print(log.path_frame().to_pandas())
             print(len(log.graph_at(4.0).nodes))
     """
     return Log(LogReader(Path(path)))

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from cogmap.graph.individuals import is_among, is_same, reach_m, shares
+from cogmap.graph.individuals import is_among, is_same, near, reach_m, shares
 from cogmap.schemas.nodes import Object
-from cogmap.testing import landmark
+from cogmap.testing import graph_of, landmark
 
 
 def _house(label: str, x_m: float, name: str = "inn", **facts: object) -> Object:
@@ -50,3 +50,23 @@ def test_an_object_is_among_others_if_one_of_them_is_it() -> None:
 
     assert is_among(_house("41a", 0.0), others)
     assert not is_among(_house("41a", 60.0), others)
+
+
+def test_what_stands_near_an_object_comes_with_its_distance_the_nearest_first() -> None:
+    school = _house("41a", 0.0, "school")
+    others = [_house("52b", 30.0), _house("53a", 12.0), _house("54a", 7.0, map="map:3")]
+    found = near("school", graph_of(school, *others), 30.0)
+
+    assert [(away_m, node.label) for away_m, node in found] == [(12.0, "53a"), (30.0, "52b")]
+    assert near("school", graph_of(school, *others), 29.0) == found[:1]
+
+
+def test_near_several_objects_of_a_name_is_near_one_of_them() -> None:
+    inns = [_house("41a", 0.0), _house("42a", 100.0)]
+    found = near("inn", graph_of(*inns, _house("53a", 90.0, "mill")), 15.0)
+
+    assert [(away_m, node.label) for away_m, node in found] == [(10.0, "53a")]
+
+
+def test_near_what_is_not_on_the_map_is_nothing() -> None:
+    assert near("harbour", graph_of(_house("41a", 0.0)), 1e6) == []

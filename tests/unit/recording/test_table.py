@@ -16,10 +16,12 @@ from cogmap.schemas import topics
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.examples import example_messages
+from cogmap.schemas.nodes import PathColumn
 from cogmap.schemas.sensing import Percept, Percepts, Pose, RangeScan, TruePose
 from cogmap.schemas.topics import Topic
 from cogmap.testing import odometry, of_type
 from tests.support.logs import SECOND_NS, write_log
+from tests.support.reference import REFERENCE
 
 TRUE_POSE = TruePose(pose=Pose(x_m=1.0, y_m=2.0, heading_rad=0.5), travelled_m=3.0, progress=0.0)
 
@@ -98,3 +100,15 @@ def test_without_pyarrow_it_is_said_how_to_install_it(
 
     with pytest.raises(UsageError, match=r"pip install 'cogmap\[tables\]'"):
         log.frame("odometry")
+
+
+def test_the_path_has_a_row_for_each_place_as_it_was_believed() -> None:
+    log = open_log(REFERENCE)
+    path = log.path_frame()
+    (segment,) = log.graph_at(log.duration_s).path
+    rows = segment.rows.numpy()
+
+    assert path.num_rows == len(rows)
+    assert path["stamp_s"].to_pylist() == rows[:, PathColumn.STAMP_S].tolist()
+    assert path["heading_rad"].to_pylist() == rows[:, PathColumn.HEADING_RAD].tolist()
+    assert log.path_frame(0.0).num_rows == 0
