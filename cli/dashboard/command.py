@@ -16,7 +16,7 @@ from cogmap.cli.dashboard.server import Dashboard
 from cogmap.cli.dashboard.source import Source
 from cogmap.cli.options import DASHBOARD_PORT
 from cogmap.errors import PortInUseError
-from cogmap.runtime.process import Stop
+from cogmap.runtime.process import Stop, give_way
 from cogmap.runtime.program import agent_option, connect_option, tied_option
 
 LOOK_S = 0.1
@@ -62,6 +62,8 @@ def dashboard(
     cogmap dashboard runs/latest      the last run
     cogmap dashboard --connect tcp/robot:7447 --open
     """
+    if log is None:
+        give_way()
     source: Source = Live(connect, agent) if log is None else Playback(log)
     try:
         asyncio.run(serve(source, host, port, opens, Stop(tied)))
