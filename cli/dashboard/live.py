@@ -54,6 +54,11 @@ class Live:
         self._thread.start()
 
     @property
+    def is_there(self) -> bool:
+        """Return whether the bus is joined."""
+        return self._connection is not None
+
+    @property
     def playing(self) -> Playing | None:
         """Return None: it is no log."""
         return None

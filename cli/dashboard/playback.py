@@ -75,6 +75,11 @@ class Playback:
             thread.start()
 
     @property
+    def is_there(self) -> bool:
+        """Return true: a log is there."""
+        return True
+
+    @property
     def playing(self) -> Playing:
         """Return how far it is played."""
         return Playing(

@@ -142,6 +142,7 @@ class Dashboard:
 
         news = {
             "label": self._source.label,
+            "is_there": self._source.is_there,
             "playing": playing,
             "parts": {name: {"version": m.version, "content": m.content} for name, m in found},
             "message": self._message(asked.topic),

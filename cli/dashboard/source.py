@@ -23,12 +23,17 @@ class Playing(msgspec.Struct, kw_only=True):
 class Source(Protocol):
     """What the server shows: whoever looks at `scene` holds `lock`.
 
-    `label` says what it is. A log is `playing`; it is None of a running system.
+    `label` says what it is. A log is `playing`; it is None of a running system. `is_there` is
+    whether the system runs; the scene of one that has ended is its last.
     """
 
     scene: Scene
     lock: threading.Lock
     label: str
+
+    @property
+    def is_there(self) -> bool:
+        """Return whether there is something to show."""
 
     @property
     def playing(self) -> Playing | None:

@@ -17,6 +17,7 @@ from selenium.webdriver.common.by import By
 from benchmarks.dashboard.browser import foreign_requests
 from cogmap.bus.codec import decode
 from cogmap.bus.interface import Arrival
+from cogmap.bus.session import free_endpoint
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.schemas import topics
 from cogmap.schemas.codelets import Offer
@@ -86,6 +87,8 @@ def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
         each.close()
 
 
+STATUS = "document.getElementById('status').textContent"
+DRIVES = "/drives|slowed|stands/"
 SLIDE_TO_END = """
 const slider = document.getElementById('time');
 slider.value = slider.max;
@@ -149,6 +152,25 @@ def test_a_run_serves_its_dashboard_and_names_the_address(start: Callable[..., R
             return False
 
     wait_until(is_served, "the page is served")
+
+
+def test_a_dashboard_waits_for_a_system_and_outlives_it(
+    start: Callable[..., Run], serve: Callable[..., Served]
+) -> None:
+    endpoint = free_endpoint()
+    served = serve("--connect", endpoint)
+    with browser() as page:
+        page.get(served.address)
+        await_script(page, f"return {STATUS} === 'no system runs here'", "it says so")
+        page.execute_script("document.getElementById('clear').click()")
+        refused = "document.getElementById('answer').textContent.includes('cogmap run')"
+        await_script(page, f"return {refused}", "a wish is refused with the remedy")
+
+        for _ in range(2):
+            run = start(*PERCEPTS, "--connect", endpoint)
+            await_script(page, f"return {DRIVES}.test({STATUS})", "the agent is shown")
+            run.close()
+            await_script(page, f"return {STATUS} === 'no system runs here'", "it is gone")
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -11,6 +11,7 @@ const have = {};
 let playing = null;
 let isSliding = false;
 let isLive = false;
+let now = null;
 
 function connect() {
   const socket = new WebSocket(`ws://${location.host}/news`);
@@ -42,6 +43,7 @@ function show(news) {
     if (shown) shown(part.content);
   }
   if (news.message) showMessage(news.message);
+  showStatus(news.is_there);
 }
 
 const panels = {
@@ -54,7 +56,8 @@ const panels = {
   truth: (content) => { map.setTruth(content); showStreets(content.streets); },
 };
 
-function showNow(now) {
+function showNow(content) {
+  now = content;
   map.setNow(now);
   const facts = [["time", `${now.at_s.toFixed(1)} s`], ["cycle", now.cycle]];
   if (now.pose) {
@@ -71,8 +74,11 @@ function showNow(now) {
   children(byId("facts"), facts.map(([name, value]) =>
     element("div", {}, [element("dt", {}, name), element("dd", {}, String(value))])));
   byId("conscious").textContent = now.conscious ? `Conscious last: ${now.conscious}` : "";
+}
 
-  if (!now.cycle && isLive) setStatus("no agent yet", "");
+function showStatus(isThere) {
+  if (!isThere) setStatus("no system runs here", "bad");
+  else if (!now || !now.cycle) setStatus("no agent yet", "");
   else if (now.halted_by) setStatus(`stands: ${now.halted_by}`, now.halted_by === "at goal" ? "good" : "bad");
   else if (now.slowed_by) setStatus(`slowed: ${now.slowed_by}`, "");
   else setStatus("drives", "good");
