@@ -11,13 +11,15 @@ from cogmap.cli.printing import print_json
 from cogmap.cli.progress import bar
 from cogmap.errors import UsageError
 from cogmap.recording import selection
+from cogmap.recording.exporting.foxglove import write_foxglove
+from cogmap.recording.exporting.tables import TableFormat, write_tables
 from cogmap.recording.log import open_log
-from cogmap.recording.tables import TableFormat, write_tables
 
 _EPILOG = """\b
 Examples:
   cogmap log export runs/latest --csv tables               every topic but images
   cogmap log export drive.mcap --parquet tables odometry truth/pose
+  cogmap log export runs/latest --foxglove drive.foxglove.mcap
 """
 
 
@@ -39,35 +41,47 @@ Examples:
     metavar="DIR",
     help="Write a Parquet file for each topic into the new folder DIR, images and all.",
 )
+@click.option(
+    "--foxglove",
+    "foxglove_path",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write images, depth, poses, path, map and range scans for Foxglove into the new file "
+    "FILE; TOPICS are of no matter.",
+)
 @json_option
 def export(
     log: Path,
     topics: tuple[str, ...],
     csv_folder: Path | None,
     parquet_folder: Path | None,
+    foxglove_path: Path | None,
     as_json: bool,
 ) -> None:
-    """Write the messages in LOG, of all topics or of TOPICS, as other tools read them.
+    """Write the drive in LOG, or the messages of TOPICS in it, as other tools read it.
 
-    A row is a message, a column a field, as `cogmap.open_log(LOG).frame(TOPIC)` gives them. Prints
-    how many rows each topic has.
+    In a table a row is a message, a column a field, as `cogmap.open_log(LOG).frame(TOPIC)` gives
+    them. Prints how many messages were written of each topic.
     """
     folders = {TableFormat.CSV: csv_folder, TableFormat.PARQUET: parquet_folder}
-    asked = [(kind, folder) for kind, folder in folders.items() if folder is not None]
-    if not asked:
-        raise UsageError("name a format and a folder, such as --csv DIR")
+    tables = [(kind, folder) for kind, folder in folders.items() if folder is not None]
+    if not tables and foxglove_path is None:
+        raise UsageError("name a format and where to write it, such as --csv DIR")
 
-    rows = {}
+    written: dict[str, dict[str, int]] = {}
     with open_log(log) as opened:
         chosen = selection.named(topics or opened.topics)
-        for kind, folder in asked:
+        for kind, folder in tables:
             with bar(f"writing {folder}") as progress:
-                rows[kind.value] = write_tables(opened, folder, kind, chosen, progress)
+                written[str(folder)] = write_tables(opened, folder, kind, chosen, progress)
+        if foxglove_path is not None:
+            with bar(f"writing {foxglove_path}") as progress:
+                written[str(foxglove_path)] = write_foxglove(opened, foxglove_path, progress)
 
     if as_json:
-        print_json(rows)
+        print_json(written)
         return
-    for kind, folder in asked:
-        click.echo(f"{folder}: {len(rows[kind.value])} topics")
-        for name, count in rows[kind.value].items():
+    for place, counts in written.items():
+        click.echo(f"{place}: {len(counts)} topics")
+        for name, count in counts.items():
             click.echo(f"  {name}: {count}")
