@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import shutil
@@ -11,9 +12,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from aiohttp import ClientSession
 
 from cogmap.bus.interface import Member
-from cogmap.bus.session import free_endpoint
+from cogmap.bus.session import free_endpoint, free_port
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.launch.drive_metrics import Recording
 from cogmap.cli.launch.watch import Watch
@@ -22,22 +24,26 @@ from cogmap.services import registry
 pytestmark = pytest.mark.compose
 
 ROOT = Path(__file__).parents[2]
-SERVICES = (*registry.MODULES, "drive", "router")
+SERVICES = (*registry.MODULES, "drive", "router", "dashboard")
 RUN = "/var/lib/cogmap/runs/latest"
 TIMEOUT_S = 90.0
+MAX_NEWS = 300
+"""What a browser is told at most while it waits for the first cycle: ten times a second."""
 
 
 class Compose:
-    """One project of `docker compose` with a drive of these options, its router published at a port
-    of its own.
+    """One project of `docker compose` with a drive of these options, its router and its dashboard
+    published at ports of their own.
     """
 
     def __init__(self, name: str, drive: str) -> None:
         self.endpoint = free_endpoint()
+        self.dashboard_port = free_port()
         _, _, port = self.endpoint.rpartition(":")
         self._environment = os.environ | {
             "COGMAP_DRIVE": drive,
             "COGMAP_PORT": port,
+            "COGMAP_DASHBOARD_PORT": str(self.dashboard_port),
             "COMPOSE_PROJECT_NAME": f"cogmap-{name}-{os.getpid()}",
         }
 
@@ -165,6 +171,21 @@ def test_no_process_in_a_container_is_roots(compose: Compose, service: str) -> N
         users = [process.split()[1] for process in processes]
         assert users
         assert "0" not in users
+
+
+def test_the_dashboard_shows_the_system_in_its_containers(compose: Compose) -> None:
+    async def cycle() -> int:
+        address = f"http://127.0.0.1:{compose.dashboard_port}/news"
+        async with ClientSession() as session, session.ws_connect(address) as socket:
+            for _ in range(MAX_NEWS):
+                await socket.send_json({})
+                news = json.loads(await socket.receive_bytes(timeout=TIMEOUT_S))
+                if news["parts"]["now"]["content"]["cycle"]:
+                    break
+            shown: int = news["parts"]["now"]["content"]["cycle"]
+            return shown
+
+    assert asyncio.run(cycle()) > 0
 
 
 def test_the_output_names_the_module_of_each_line(compose: Compose) -> None:
