@@ -18,14 +18,16 @@ from cogmap.cli.dashboard.scene import FOLLOWED, Scene
 from cogmap.cli.dashboard.source import Playing, Wish
 from cogmap.errors import NoAnswerError, NoRouterError, UsageError
 from cogmap.graph.graph import Graph
+from cogmap.graph.individuals import called
 from cogmap.graph.replica import Fetched, Replica, snapshot_over
+from cogmap.hints import did_you_mean
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.graph import DropNode, SnapshotRequest
-from cogmap.schemas.nodes import Goal, goal_id
+from cogmap.schemas.nodes import Goal, Object, goal_id
 from cogmap.schemas.sensing import StreetClosure
 from cogmap.schemas.topics import Topic
 from cogmap.services.global_workspace.config import Config
@@ -76,7 +78,7 @@ class Live:
         if connection is None:
             raise UsageError(f"nothing runs at {self._endpoint}: start it with `cogmap run`")
         with self.lock:
-            message, done = _asked(wish, self.scene.graph)
+            message, done = message_for(wish, self.scene.graph)
         connection.publish(message)
         return done
 
@@ -167,8 +169,8 @@ def _scene(replica: Replica, label: str) -> Scene:
     return Scene(replica.graph, replica.follow, Config(), Path(label))
 
 
-def _asked(wish: Wish, graph: Graph) -> tuple[Message, str]:
-    """Return what to publish for a wish, and what that does."""
+def message_for(wish: Wish, graph: Graph) -> tuple[Message, str]:
+    """Return what to publish for a wish, and a sentence on what that does. Raises UsageError."""
     if wish.street:
         done = "closed" if wish.closed else "opened"
         closure = StreetClosure(street=wish.street, closed=wish.closed)
@@ -178,10 +180,14 @@ def _asked(wish: Wish, graph: Graph) -> tuple[Message, str]:
         goals = [DropNode(id=goal.id) for goal in graph.of_kind(Goal)]
         return Offer(cycle=graph.cycle, operations=[*goals]), "every goal is forgotten"
 
-    if isinstance(wish.goal, str) and wish.goal:
+    if wish.goal is not None:
+        if not called(wish.goal, graph):
+            known = {node.name or node.label for node in graph.of_kind(Object)}
+            meant = did_you_mean(wish.goal, sorted(known), "the map shows what it has")
+            raise UsageError(f"the map has no object {wish.goal!r}: {meant}")
         goal = Goal(id=goal_id(wish.goal), base_level=1.0, object=wish.goal)
-    elif isinstance(wish.goal, tuple):
-        x_m, y_m = wish.goal
+    elif wish.place is not None:
+        x_m, y_m = wish.place
         goal = Goal(id=goal_id(f"{x_m:g},{y_m:g}"), base_level=1.0, x_m=x_m, y_m=y_m)
     else:
         raise UsageError("a running system takes goals and streets: give one")

@@ -88,6 +88,7 @@ class Playback:
             indexed_s=self._seconds(self._keyframes[-1].at_ns),
             is_playing=self._is_playing,
             speed=self._speed,
+            failure=self._failure,
         )
 
     def watched(self, by: int) -> None:
@@ -148,9 +149,9 @@ class Playback:
             for record in reader.records(_SMALL):
                 if self._has_ended:
                     return
-                while record.log_time_ns >= due_ns:
-                    self._keyframes.append(self._keyframe(scene, due_ns))
-                    due_ns += round(KEYFRAME_S * 1e9)
+                if record.log_time_ns >= due_ns:
+                    self._keyframes.append(self._keyframe(scene, record.log_time_ns))
+                    due_ns = record.log_time_ns + round(KEYFRAME_S * 1e9)
                 _take(scene, reader, record)
         except LogError as error:
             self._failure = str(error)
@@ -160,23 +161,30 @@ class Playback:
         """Show what is asked for, and go on while it plays."""
         last_s = time.monotonic()
         while not self._has_ended:
-            if self._seek_ns is not None:
-                wanted_ns = self._seek_ns
-                self._seek_ns = None
-                self._steps = 0
-                self._show(wanted_ns)
-            elif self._steps:
-                self._steps -= 1
-                self._advance(self._end_ns, self.scene.graph.cycle + 1)
-
             now_s = time.monotonic()
-            if self._is_playing:
-                passed_ns = round((now_s - last_s) * self._speed * 1e9)
-                self._advance(min(self._at_ns + passed_ns, self._end_ns))
-                self._is_playing = self._at_ns < self._end_ns
+            try:
+                self._go_on(now_s - last_s)
+            except LogError as error:
+                self._failure = str(error)
+                self._is_playing = False
             last_s = now_s
             self._changed.wait(TICK_S if self._is_playing else None)
             self._changed.clear()
+
+    def _go_on(self, passed_s: float) -> None:
+        """Show the moment that is asked for, or what follows if it plays."""
+        if self._seek_ns is not None:
+            wanted_ns = self._seek_ns
+            self._seek_ns = None
+            self._steps = 0
+            self._show(wanted_ns)
+        elif self._steps:
+            self._steps -= 1
+            self._advance(self._end_ns, self.scene.graph.cycle + 1)
+        elif self._is_playing:
+            passed_ns = round(passed_s * self._speed * 1e9)
+            self._advance(min(self._at_ns + passed_ns, self._end_ns))
+            self._is_playing = self._at_ns < self._end_ns
 
     def _show(self, at_ns: int) -> None:
         """Show the moment `at_ns`, by the keyframe before it."""

@@ -8,16 +8,20 @@ from typing import Protocol
 import msgspec
 
 from cogmap.cli.dashboard.scene import Scene
+from cogmap.schemas.base import Coordinate, Name
 
 
 class Playing(msgspec.Struct, kw_only=True):
-    """How a log is played: at which time, of how much; `indexed_s` of it can be shown already."""
+    """How a log is played: at which time, of how much; `indexed_s` of it can be shown already.
+    `failure` says why the rest cannot be, empty if it can.
+    """
 
     at_s: float
     duration_s: float
     indexed_s: float
     is_playing: bool
     speed: float
+    failure: str = ""
 
 
 class Source(Protocol):
@@ -54,12 +58,13 @@ class Source(Protocol):
 class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """What a person wants done; one of its fields is given.
 
-    `goal` is an object's name, or x and y on the map; `clear` forgets all goals. `street` is to be
-    `closed` or opened. Of a log: `seek_s` is a time to show, `play` whether it is to go on, `step`
-    asks for the next cycle, `speed` is how fast it plays.
+    `goal` is an object's name or label, `place` x and y on the map, to go to; `clear` forgets all
+    goals. `street` is to be `closed` or opened. Of a log: `seek_s` is a time to show, `play`
+    whether it is to go on, `step` asks for the next cycle, `speed` is how fast it plays.
     """
 
-    goal: str | tuple[float, float] | None = None
+    goal: Name | None = None
+    place: tuple[Coordinate, Coordinate] | None = None
     clear: bool = False
     street: str = ""
     closed: bool = True

@@ -6,7 +6,7 @@ import { showSystem, showTopics, showMessage } from "/page/system.js";
 import { byId, children, element } from "/page/dom.js";
 
 const RETRY_MS = 1000;
-const map = new MapView(byId("map"), byId("layers"), (x, y) => wish({ goal: [x, y] }));
+const map = new MapView(byId("map"), byId("layers"), (x, y) => wish({ place: [x, y] }));
 const have = {};
 let playing = null;
 let isSliding = false;
@@ -97,6 +97,7 @@ function showPlaying(now) {
   if (!isSliding) slider.value = now.at_s;
   const indexed = now.indexed_s < now.duration_s ? `, ${Math.round(100 * now.indexed_s / now.duration_s)} % read` : "";
   byId("clock").textContent = `${now.at_s.toFixed(1)} of ${now.duration_s.toFixed(1)} s${indexed}`;
+  if (now.failure) say(now.failure, false);
   byId("play").textContent = now.is_playing ? "Pause" : "Play";
   byId("play").setAttribute("aria-pressed", now.is_playing);
 }
@@ -113,14 +114,18 @@ function showStreets(streets) {
 }
 
 async function wish(wanted) {
-  const answer = byId("answer");
   const response = await fetch("/wish", {
     method: "POST",
     headers: { "Content-Type": "application/json" },
     body: JSON.stringify(wanted),
   });
-  answer.textContent = await response.text();
-  answer.className = response.ok ? "" : "bad";
+  say(await response.text(), response.ok);
+}
+
+function say(sentence, isDone) {
+  const answer = byId("answer");
+  if (answer.textContent !== sentence) answer.textContent = sentence;
+  answer.className = isDone ? "" : "bad";
 }
 
 byId("person").addEventListener("submit", (event) => {
@@ -128,7 +133,7 @@ byId("person").addEventListener("submit", (event) => {
   const text = byId("goal").value.trim();
   const place = text.split(/[\s,]+/).map(Number);
   if (!text) return;
-  wish({ goal: place.length === 2 && place.every(Number.isFinite) ? place : text });
+  wish(place.length === 2 && place.every(Number.isFinite) ? { place } : { goal: text });
 });
 byId("clear").onclick = () => wish({ clear: true });
 byId("close").onclick = () => wish({ street: byId("street").value, closed: true });

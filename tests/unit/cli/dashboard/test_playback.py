@@ -12,6 +12,7 @@ from cogmap.cli.dashboard.playback import Playback
 from cogmap.cli.dashboard.source import Wish
 from cogmap.errors import LogError, UsageError
 from cogmap.recording import open_log
+from cogmap.recording.storage.index import read_index
 from cogmap.schemas import topics
 from cogmap.schemas.sensing import View
 from tests.support.reference import REFERENCE
@@ -79,6 +80,21 @@ def test_a_speed_that_makes_no_sense_is_limited(playback: Playback) -> None:
     playback.act(Wish(speed=1e9))
 
     assert playback.playing.speed == 100.0
+
+
+def test_damage_is_said_and_what_is_before_it_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    content = bytearray(REFERENCE.read_bytes())
+    chunk = read_index(REFERENCE).chunks[-1]
+    content[chunk.offset + 200] ^= 0xFF
+    path.write_bytes(content)
+    source = Playback(path)
+    try:
+        wait_until(lambda: "is damaged" in source.playing.failure, "the damage is said")
+        with pytest.raises(UsageError, match="is damaged"):
+            source.act(Wish(play=True))
+    finally:
+        source.close()
 
 
 def test_what_is_no_log_is_said(tmp_path: Path) -> None:
