@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
@@ -174,8 +175,12 @@ def test_a_dashboard_waits_for_a_system_and_outlives_it(
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
-def test_a_log_is_shown_on_a_narrow_screen_too(serve: Callable[..., Served], scheme: str) -> None:
-    served = serve(str(REFERENCE))
+def test_a_log_is_shown_on_a_narrow_screen_too(
+    serve: Callable[..., Served], scheme: str, tmp_path: Path
+) -> None:
+    log = tmp_path / f"{'long' * 20}.mcap"
+    shutil.copy(REFERENCE, log)
+    served = serve(str(log))
     with browser(320, 800, scheme) as page:
         page.get(served.address)
         show_end(page)

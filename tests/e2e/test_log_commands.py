@@ -65,12 +65,12 @@ def test_info_counts_the_messages_of_each_topic_by_source(path: Path) -> None:
 
     assert found["agent"] == "a"
     assert found["messages"] == 2 * COUNT
-    assert found["duration_s"] == 4.0
+    assert found["duration_s"] == pytest.approx(4.0)
     assert found["gaps"] == []
 
     (wheels,) = (topic for topic in found["topics"] if topic["topic"] == "odometry")
     assert wheels["count"] == COUNT
-    assert wheels["rate_hz"] == 1.25
+    assert wheels["rate_hz"] == pytest.approx(1.25)
     assert wheels["sources"] == {"sim": COUNT}
 
     assert "sim:5" in text
