@@ -44,8 +44,8 @@ def measure(setting: Setting, source: Path | None = None) -> Metrics:
     announce = setting.announce
     if source is None:
         announce(f"driving for {DRIVE_S:g} s")
-        drive(setting.folder / "drive", seconds=DRIVE_S)
-        source = setting.folder / "drive" / LOG_NAME
+        drive(setting.folder, seconds=DRIVE_S)
+        source = setting.folder / LOG_NAME
 
     announce(f"repeating its messages to {LONG_BYTES / 1e9:g} GB")
     path = setting.folder / "long.mcap"
