@@ -49,7 +49,7 @@ def map_part(graph: Graph, version: int) -> MapPart:
     rows = rows_of(graph.path)
     return MapPart(
         layer=_layer(graph, version),
-        objects=[_object(graph, node) for node in graph.of_kind(Object) if node.map == ROOT_MAP],
+        objects=[_object(node) for node in graph.of_kind(Object) if node.map == ROOT_MAP],
         path=flat(rows[:, [PathColumn.X_M, PathColumn.Y_M]]),
         closures=flat(_closures_m(graph, rows)),
         cuts=flat(cut_links_m(graph)),
@@ -76,7 +76,7 @@ def _layer(graph: Graph, version: int) -> Layer | None:
     )
 
 
-def _object(graph: Graph, node: Object) -> MapObject:
+def _object(node: Object) -> MapObject:
     samples_m = node.positions_m()
     step = max(1, len(samples_m) // MAX_SAMPLES)
     return MapObject(
@@ -84,8 +84,6 @@ def _object(graph: Graph, node: Object) -> MapObject:
         name=node.name,
         at_m=(round(node.x_m, 2), round(node.y_m, 2)),
         spread_m=(round(SPREADS * node.x_sd_m, 2), round(SPREADS * node.y_sd_m, 2)),
-        sightings=node.sightings,
-        activation=round(float(graph.total_activation(node)), 3),
         samples=flat(samples_m[::step]) if node.offsets_m is not None else [],
     )
 

@@ -56,8 +56,6 @@ class MapObject(Part, kw_only=True):
     name: str
     at_m: Point
     spread_m: Point
-    sightings: int
-    activation: float
     samples: Flat
 
 

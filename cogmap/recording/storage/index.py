@@ -243,14 +243,19 @@ def _from_scan(path: Path) -> LogIndex:
     """Index all that is whole, up to the first record that is not."""
     index = LogIndex()
     size = path.stat().st_size
+    is_finished = False
     with path.open("rb") as file:
         reader = StreamReader(file, emit_chunks=True, record_size_limit=size)
         end = len(MCAP0_MAGIC)
         with suppress(Exception):  # the library raises whatever the nonsense in it leads to
             for record in reader.records:
                 _enter(index, record, end, file.tell())
-                end = size if isinstance(record, Footer) else file.tell()
+                is_finished = isinstance(record, Footer)
+                end = size if is_finished else file.tell()
 
+    if index.chunks and not is_finished:
+        # Of the last chunk some indexes may have been cut off.
+        index.chunks[-1] = replace(index.chunks[-1], indexes=None)
     index.unreadable_bytes = max(0, size - end)
     return index
 

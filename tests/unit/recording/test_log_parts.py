@@ -17,7 +17,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta, Phase
 from cogmap.testing import odometry
-from tests.support.logs import ABOUT, SECOND_NS
+from tests.support.logs import ABOUT, SECOND_NS, scan
 
 CHUNKS = 40
 IN_A_CHUNK = 5
@@ -117,6 +117,24 @@ def test_a_log_that_was_cut_off_gives_the_rows_that_are_whole(path: Path) -> Non
     path.write_bytes(path.read_bytes()[: read_index(path).chunks[30].offset])
 
     assert open_log(path).frame(topics.ODOMETRY).num_rows == 30 * IN_A_CHUNK
+
+
+def test_a_chunk_whose_indexes_were_cut_off_is_read_whole(tmp_path: Path) -> None:
+    path = tmp_path / "whole.mcap"
+    writer = LogWriter(path, topics_to_record(), ABOUT)
+    for number in range(IN_A_CHUNK):
+        writer.write(topics.ODOMETRY, encode(odometry(number)), None, SECOND_NS + 2 * number)
+        writer.write(topics.SCAN, encode(scan(number)), None, SECOND_NS + 2 * number + 1)
+    writer.close()
+    (chunk,) = read_index(path).chunks
+    content = path.read_bytes()
+
+    cut = tmp_path / "cut.mcap"
+    for more in range(0, 400, 7):
+        cut.write_bytes(content[: chunk.end + more])
+        for topic in (topics.ODOMETRY, topics.SCAN):
+            assert len(list(LogReader(cut).records({topic}))) == IN_A_CHUNK
+            assert len(LogReader(cut).payloads(topic)) == IN_A_CHUNK
 
 
 def test_damage_elsewhere_is_not_met(path: Path) -> None:
