@@ -27,6 +27,7 @@ Written = type[GraphNode] | LinkKind | PlaceColumn
 class CycleContext:
     """What a cognitive cycle is about: a view's percepts, the self-motion since the self node was
     last moved at `since_ns`, as in SelfMotion, and the range scan of the view, where there is one.
+    Percepts that are `waiting` are of known objects, but it cannot be told yet of which.
     """
 
     cycle: int
@@ -35,6 +36,7 @@ class CycleContext:
     version: int = 0
     scan: RangeScan | None = None
     since_ns: int = NEVER_NS
+    waiting: tuple[Percept, ...] = ()
 
     @property
     def stamp_ns(self) -> int:

@@ -64,6 +64,7 @@ from cogmap.schemas.nodes.situation import (
     PathIntegration,
     Percept,
     Self,
+    Sighting,
 )
 
 __all__ = [
@@ -116,6 +117,7 @@ __all__ = [
     "Self",
     "SelfColumn",
     "Side",
+    "Sighting",
     "SubMap",
     "attention_id",
     "category_id",

@@ -36,6 +36,18 @@ class PathIntegration(msgspec.Struct, kw_only=True, frozen=True):
         return np.array([self.variance_m2, self.variance_rad2])
 
 
+class Sighting(msgspec.Struct, kw_only=True, frozen=True):
+    """How an object was seen in a view: where it stands by path integration until then, how exactly
+    it was seen, and path integration then.
+    """
+
+    x_m: Finite
+    y_m: Finite
+    range_sd_m: Spread
+    bearing_sd_rad: Spread
+    odometry: PathIntegration
+
+
 class Misfits(msgspec.Struct, kw_only=True, frozen=True):
     """Views that did not fit the map.
 
@@ -110,8 +122,10 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     to a thousandth of their spread. `sightings` is the number of views that agree with the
     position, `misses` that of views in a row that do not. One that is `surveyed` was given, and
     stays where it is. `last_seen_ns` and `created_ns` are times of views; `seen_from_m` is where
-    the agent stood in the last one, relative to the object. `function` is what it is used for, such
-    as "shop", empty if that is unknown.
+    the agent stood in the last one, relative to the object, and `last_sighting` how it saw it, if
+    by range and bearing. `shared_variance_m2` is how uncertain the agent's position was when it
+    placed the object: both share that error. `function` is what it is used for, such as "shop",
+    empty if that is unknown.
     """
 
     label: Name
@@ -130,6 +144,8 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     misses: Count = 0
     last_seen_ns: Stamp = NEVER_NS
     seen_from_m: tuple[Finite, Finite] | None = None
+    last_sighting: Sighting | None = None
+    shared_variance_m2: Spread = 0.0
     created_ns: Stamp = 0
     surveyed: bool = False
     offsets_m: Matrix | None = None

@@ -272,8 +272,9 @@ class Workspace:
         self._begun_ns = percepts.stamp_ns
         moved_ns = self._moved_until_ns
         motions = self._sensed.motions(percepts.stamp_ns, moved_ns)
-        entered = self._individuals.labelled(percepts, motions)
-        self._context = self._sensed.context(entered, moved_ns, graph.cycle + 1, graph.version)
+        entered, waiting = self._individuals.labelled(percepts, motions)
+        context = self._sensed.context(entered, moved_ns, graph.cycle + 1, graph.version)
+        self._context = replace(context, waiting=waiting)
         self._phase = -1
         self._is_repeated = False
 

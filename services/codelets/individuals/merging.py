@@ -114,6 +114,7 @@ def merged(kept: Object, gone: Object) -> Object:
     if len({side.shape[1] for side in sides}) == 1:
         appearances = Matrix.of(np.vstack(sides)[:MAX_APPEARANCES], "<f2")
 
+    last_seen = max(kept, gone, key=lambda node: node.last_seen_ns)
     return msgspec.structs.replace(
         kept,
         names=names_of_both(kept, gone),
@@ -123,7 +124,9 @@ def merged(kept: Object, gone: Object) -> Object:
         x_m=x_m,
         y_m=y_m,
         sightings=kept.sightings + gone.sightings,
-        last_seen_ns=max(kept.last_seen_ns, gone.last_seen_ns),
+        last_seen_ns=last_seen.last_seen_ns,
+        last_sighting=last_seen.last_sighting,
+        shared_variance_m2=min(kept.shared_variance_m2, gone.shared_variance_m2),
         created_ns=min(kept.created_ns, gone.created_ns),
     )
 

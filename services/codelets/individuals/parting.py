@@ -112,12 +112,14 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
         y_m=float(parts.second_m[1]),
         sightings=int(parts.is_second.sum()),
         seen_from_m=None,
+        last_sighting=None,
     )
     first = msgspec.structs.replace(
         node,
         names={each: (1 - share) * evidence for each, evidence in node.names.items()},
         x_m=float(parts.first_m[0]),
         y_m=float(parts.first_m[1]),
+        last_sighting=None,
         sightings=max(1, node.sightings - second.sightings),
     )
     operations: list[Operation] = []

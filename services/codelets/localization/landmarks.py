@@ -25,6 +25,7 @@ from cogmap.schemas.nodes import (
     Object,
     Self,
     SelfColumn,
+    Sighting,
     nearest_place,
     object_id,
 )
@@ -300,11 +301,36 @@ def refreshed(
     )
     agent = graph.agent
     if agent is not None:
-        from_m = (agent.x_m - node.x_m, agent.y_m - node.y_m)
-        node = msgspec.structs.replace(node, seen_from_m=from_m)
+        shared_m2 = agent.x_sd_m**2 + agent.y_sd_m**2
+        if before.sightings and before.created_ns == after.created_ns:
+            shared_m2 = min(shared_m2, before.shared_variance_m2)
+
+        node = msgspec.structs.replace(
+            node,
+            seen_from_m=(agent.x_m - node.x_m, agent.y_m - node.y_m),
+            last_sighting=sighting_of(percept, agent),
+            shared_variance_m2=shared_m2,
+        )
 
     place = nearest_place(node.x_m, node.y_m, graph.cell_m(node.map), node.map)
     return [node, Link(source=node.id, target=place, kind=LinkKind.AT)]
+
+
+def sighting_of(percept: Percept, agent: Self) -> Sighting | None:
+    """Return how something is seen now; None if its range or bearing is unknown."""
+    if not (percept.has_range and percept.has_bearing):
+        return None
+
+    path = agent.odometry
+    range_m = percept.range_m / (1 + agent.range_gain)
+    direction_rad = path.heading_rad + percept.bearing_rad
+    return Sighting(
+        x_m=path.x_m + range_m * math.cos(direction_rad),
+        y_m=path.y_m + range_m * math.sin(direction_rad),
+        range_sd_m=percept.range_sd_m,
+        bearing_sd_rad=percept.bearing_sd_rad,
+        odometry=path,
+    )
 
 
 def learned_names(known: Mapping[str, float], percept: Percept) -> dict[str, float]:

@@ -9,30 +9,36 @@ fitted its map: then percepts are of the objects that they look like, wherever t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import count
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
 
-from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import compose, moved_by, wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import OVERLAP
 from cogmap.graph.likeness import is_new_side, likeness
 from cogmap.schemas import nodes
 from cogmap.schemas.array import Array
-from cogmap.schemas.nodes import POSE_COLUMNS, Object, Self, individual_label
+from cogmap.schemas.nodes import Object, Self, individual_label
 from cogmap.schemas.sensing import Percept, Percepts
-from cogmap.services.workspace.association.joint import (
+from cogmap.services.workspace.association.beliefs import (
     FARTHEST_M,
-    NONE,
     Belief,
     Possible,
-    associate,
+    Source,
+    belief_of,
 )
+from cogmap.services.workspace.association.crowding import (
+    is_located,
+    log_crowding,
+    nearest_seen_m2,
+)
+from cogmap.services.workspace.association.joint import NONE, associate
 from cogmap.services.workspace.association.known_objects import KnownObjects
 from cogmap.services.workspace.association.looks import Look, look_of
+from cogmap.services.workspace.association.tracking import tracked
 
 NEAR_M = 12.0
 """An object stands at most so far from where a percept of it is seen, beside what is uncertain."""
@@ -56,24 +62,11 @@ now and then."""
 P_IS_HERE = 20.0
 """The agent is where it believes if what it sees is so many times likelier there than elsewhere."""
 
-P_LOCAL = 0.5
-P_DRIFTED = 0.02
-"""How likely the agent stands as surely to what it sees as to what it has seen of late, and how
-likely it has drifted as far as path integration has since the start."""
-
-MAX_DRIFT_M = 3.0
-MAX_TURNED_RAD = 0.3
-"""With more drift no place tells things apart; then only constellations and looks do."""
-
-MIN_VARIANCE = 1e-6
-"""In square metres and radians: less than any pose is known to, so that matrices have inverses."""
+UNLIKELY = 1e-3
+"""An object that a percept is less likely of is no candidate for it."""
 
 MAX_CANDIDATES = 8
 """Objects that a percept is compared with at most: the nearest."""
-
-LOCAL_SD_M = 0.5
-"""What was learned in the last views stands to the agent as surely as that, however uncertain both
-are on the map."""
 
 GATE = 3.0
 """Standard deviations within which nearly all normal errors are."""
@@ -90,6 +83,15 @@ more, more of the buildings are on the map and fewer of these right: in three to
 0.92 and 0.80 with 4.0, 0.87 and 0.83 with 3.0, all else as it was then."""
 
 
+class Associated(NamedTuple):
+    """A view's percepts, each with the label of the object that it is of, and those that wait: each
+    is of one of its candidates, but it cannot be told yet of which.
+    """
+
+    percepts: Percepts
+    waiting: tuple[Percept, ...] = ()
+
+
 class Individuals:
     """The individuals of the map, and the percepts that are taken to be of them."""
 
@@ -97,9 +99,9 @@ class Individuals:
         self._graph = graph
         self.known = KnownObjects(graph)
 
-    def labelled(self, percepts: Percepts, motions: Array) -> Percepts:
-        """Label each of `percepts` by the individual object that it is of; leave out those that
-        wait, or are mistakes. One whose source knows the individual, as by a barcode, has a label.
+    def labelled(self, percepts: Percepts, motions: Array) -> Associated:
+        """Label each of `percepts` by the individual object that it is of, beside those that wait;
+        leave out mistakes. One whose source knows the individual, as by a barcode, has a label.
 
         `motions` are those since the self node was moved last.
         """
@@ -108,14 +110,15 @@ class Individuals:
         seen = [percept for percept in percepts.objects if not percept.label]
         new_labels = (individual_label(self._graph.cycle + 1, number) for number in count())
         if not seen:
-            return percepts
+            return Associated(percepts)
         if agent is None:
             first = [msgspec.structs.replace(each, label=next(new_labels)) for each in seen]
-            return msgspec.structs.replace(percepts, objects=[*identified, *first])
+            return Associated(msgspec.structs.replace(percepts, objects=[*identified, *first]))
 
         belief = belief_of(agent, np.asarray(motions.numpy(), np.float64))
         looks = [look_of(percept, self.known) for percept in seen]
-        candidates, possible = self._possible(seen, looks, agent, belief)
+        measured = [_with_true_range(percept, agent.range_gain) for percept in seen]
+        candidates, possible = self._possible(measured, looks, agent, belief)
         found = associate(possible, belief)
         is_known = found.objects != NONE
         is_here = bool(is_known.all()) or _is_here(
@@ -125,10 +128,14 @@ class Individuals:
         taken = {candidates[number].label for number in found.objects.tolist() if number != NONE}
         taken |= {percept.label for percept in identified}
         objects = list(identified)
+        waiting = []
         for place, percept in enumerate(seen):
             number = int(found.objects[place])
             probability = float(found.probability[place])
             if probability < CERTAIN:
+                shares = found.shares[place]
+                if 1 - shares.get(NONE, 0.0) >= CERTAIN:
+                    waiting.append(_one_of(percept, possible[place], candidates, shares))
                 continue
 
             if number != NONE:
@@ -140,11 +147,12 @@ class Individuals:
             if not is_here and alike is not None and alike.label not in taken:
                 taken.add(alike.label)
                 objects.append(_of(percept, alike, probability))
-            elif is_placed(percept) and self._stands_clear(percept, agent, belief):
+            elif is_placed(percept) and self._stands_clear(measured[place], agent, belief):
                 label = next(new_labels)
                 objects.append(msgspec.structs.replace(percept, label=label))
 
-        return msgspec.structs.replace(percepts, objects=objects)
+        entered = msgspec.structs.replace(percepts, objects=objects)
+        return Associated(entered, tuple(waiting))
 
     def _possible(
         self, seen: Sequence[Percept], looks: Sequence[Look], agent: Self, belief: Belief
@@ -161,10 +169,13 @@ class Individuals:
                     candidates.append(node)
 
             likenesses = np.array([P_SEEN * likeness(percept, node) for node in nodes])
+            tracked_m, tracked_m2 = tracked(nodes, agent, belief.covariances[Source.MAPPED])
+            mapped_m = np.array([(node.x_m, node.y_m) for node in nodes]).reshape(-1, 2)
+            mapped_m2 = np.array([node.covariance_m2() for node in nodes]).reshape(-1, 2, 2)
             one = Possible(
                 percept=percept,
-                places_m=np.array([(node.x_m, node.y_m) for node in nodes]).reshape(-1, 2),
-                own_m2=np.array([node.covariance_m2() for node in nodes]).reshape(-1, 2, 2),
+                places_m=np.stack([tracked_m, mapped_m]),
+                own_m2=np.stack([tracked_m2, mapped_m2]),
                 numbers=np.array([number_of[node.label] for node in nodes], np.int64),
                 log_likeness=np.log(likenesses),
                 log_none=math.log((NEW_PER_VIEW + MISTAKES_PER_VIEW) * look.of_another),
@@ -182,7 +193,7 @@ class Individuals:
             float(belief.covariances[:, 0, 0].max() + belief.covariances[:, 1, 1].max())
         )
         within_m = percept.range_m if percept.has_range else FARTHEST_M
-        if percept.has_bearing and percept.has_range:
+        if is_located(percept):
             x_m, y_m = place_m(percept, belief)
             within_m = 0.0
 
@@ -195,7 +206,7 @@ class Individuals:
         """Decide whether a percept is of something that may stand where it is seen: two things do
         not stand in one place. If its place is not known, it may.
         """
-        if not (percept.has_bearing and percept.has_range):
+        if not is_located(percept):
             return True
 
         at_m = place_m(percept, belief)
@@ -226,37 +237,6 @@ def as_entered(percepts: Percepts, graph: Graph) -> Percepts:
     return msgspec.structs.replace(percepts, objects=objects)
 
 
-def belief_of(agent: Self, motions: Floats) -> Belief:
-    """Return what is believed of the agent's pose after (n, 5) `motions`, three ways: as sure as it
-    is to what was learned in the last views, as its samples are, and as path integration since the
-    start is, for the samples may be surer than they are right.
-    """
-    pose = np.array([agent.x_m, agent.y_m, agent.heading_rad])
-    samples = agent.samples.numpy()[:, :POSE_COLUMNS]
-    offsets = samples - pose
-    offsets[:, 2] = wrap_angle(offsets[:, 2])
-    believed = offsets.T @ offsets / len(offsets)
-
-    sd_m = math.hypot(agent.x_sd_m, agent.y_sd_m)
-    local = believed * min(1.0, LOCAL_SD_M / max(sd_m, LOCAL_SD_M)) ** 2
-
-    path = agent.odometry
-    turned_rad2 = min(path.variance_rad2, MAX_TURNED_RAD**2)
-    drifted_m2 = path.variance_m2 + turned_rad2 * (path.x_m**2 + path.y_m**2)
-    drifted_m2 = min(drifted_m2, MAX_DRIFT_M**2)
-    drifted = believed + np.diag([drifted_m2, drifted_m2, turned_rad2])
-
-    moved_sd = motions[:, 3:5] * motions[:, 2:3]
-    moved = np.square(moved_sd).sum(axis=0)
-    step_noise = np.diag([moved[0], moved[0], moved[1]]) + np.eye(3) * MIN_VARIANCE
-    mean = compose(pose, moved_by(np.zeros(3), motions))
-    return Belief(
-        means=np.tile(mean, (3, 1)),
-        covariances=np.stack([local, believed, drifted]) + step_noise,
-        log_weights=np.log([P_LOCAL, 1 - P_LOCAL - P_DRIFTED, P_DRIFTED]),
-    )
-
-
 def place_m(percept: Percept, belief: Belief) -> tuple[float, float]:
     """Return where something is seen from the pose that is believed."""
     x_m, y_m, heading_rad = belief.means[0].tolist()
@@ -283,8 +263,12 @@ def _is_here(
         return True
 
     log_elsewhere = math.log(p_elsewhere)
-    for place in placed:
-        none = (NEW_PER_VIEW + MISTAKES_PER_VIEW) * looks[place].of_another
+    for row, place in enumerate(placed):
+        percept = possible[place].percept
+        before = [possible[other].percept for other in placed[:row]]
+        nearest_m2 = np.array([nearest_seen_m2(percept, before)])
+        crowding = math.exp(log_crowding(percept, nearest_m2)[0])
+        none = (NEW_PER_VIEW + MISTAKES_PER_VIEW) * looks[place].of_another * crowding
         log_elsewhere += math.log(P_SEEN * looks[place].of_any + none)
 
     here = associate([possible[place] for place in placed], belief)
@@ -295,11 +279,36 @@ def is_placed(percept: Percept) -> bool:
     """Decide whether something that was not met yet may enter the map where it is seen: it waits
     until it is nearer if its place says nothing of which of its neighbours it is.
     """
-    if not (percept.has_bearing and percept.has_range):
+    if not is_located(percept):
         return True
 
     across_sd_m = percept.range_m * percept.bearing_sd_rad
     return math.hypot(percept.range_sd_m, across_sd_m) <= LARGEST_SD_M
+
+
+def _with_true_range(percept: Percept, range_gain: float) -> Percept:
+    """Return a percept with its range as it is, if ranges are seen too large by a share."""
+    if not percept.has_range:
+        return percept
+    return msgspec.structs.replace(percept, range_m=percept.range_m / (1 + range_gain))
+
+
+def _one_of(
+    percept: Percept, possible: Possible, known: Sequence[Object], shares: Mapping[int, float]
+) -> Percept:
+    """Return a percept that is of one of the `known` objects, by number, that it may well be of:
+    each with how likely its look alone makes it that one.
+    """
+    kept = np.array([shares.get(number, 0.0) > UNLIKELY for number in possible.numbers.tolist()])
+    likeness_of = np.exp(possible.log_likeness[kept])
+    likeness_of /= likeness_of.sum()
+    labels = [known[number].label for number in possible.numbers[kept].tolist()]
+    return msgspec.structs.replace(
+        percept,
+        candidates=dict(zip(labels, likeness_of.tolist(), strict=True)),
+        certainty=min(1.0, 1 - shares.get(NONE, 0.0)),
+        appearance=None,
+    )
 
 
 def _of(percept: Percept, node: Object, probability: float) -> Percept:

@@ -17,15 +17,18 @@ import numpy as np
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.se2 import wrap_angle
 from cogmap.schemas.sensing import Percept
+from cogmap.services.workspace.association.beliefs import FARTHEST_M, Belief, Possible
+from cogmap.services.workspace.association.crowding import (
+    log_crowding,
+    nearest_known_m2,
+    nearest_seen_m2,
+)
 
 BEAM = 32
 """Associations that are followed at once; each percept has a few possible objects."""
 
 NONE = -1
 """A percept that is of no object that is known."""
-
-FARTHEST_M = 50.0
-"""The range up to which anything may be seen: no building is recognised from farther."""
 
 MISJUDGED = 0.02
 """How likely a percept is placed much worse than it states: a part is taken for the whole, or two
@@ -41,41 +44,14 @@ MIN_DISTANCE_M = 0.1
 """Nothing is seen from nearer; directions stay defined."""
 
 
-class Belief(NamedTuple):
-    """A mixture of h normal distributions of the pose: means (h, 3), covariances (h, 3, 3), and the
-    logarithms of their weights, (h,).
-    """
-
-    means: Floats
-    covariances: Floats
-    log_weights: Floats
-
-    def take(self, rows: Indices) -> Belief:
-        """Return those of these rows."""
-        return Belief(self.means[rows], self.covariances[rows], self.log_weights[rows])
-
-
-class Possible(NamedTuple):
-    """A percept, and the m objects that it may be of: where they stand (m, 2), with the covariances
-    of that (m, 2, 2), their numbers (m,), the logarithm of how much likelier it looks so if it is
-    of each than of any, (m,), and that of how likely it is of none of them.
-    """
-
-    percept: Percept
-    places_m: Floats
-    own_m2: Floats
-    numbers: Indices
-    log_likeness: Floats
-    log_none: float
-
-
 class Association(NamedTuple):
-    """The likeliest object of each of k percepts, or NONE, (k,), how likely that is, (k,), and the
-    logarithm of how likely all that is seen is.
+    """The likeliest object of each of k percepts, or NONE, (k,), how likely that is, (k,), which
+    objects each may be of and how likely, and the logarithm of how likely all that is seen is.
     """
 
     objects: Indices
     probability: Floats
+    shares: list[dict[int, float]]
     log_evidence: float
 
 
@@ -85,15 +61,23 @@ def associate(percepts: Sequence[Possible], belief: Belief) -> Association:
 
     # The percepts that are told best come first: a wrong beginning is seen early.
     order = sorted(range(len(percepts)), key=lambda number: len(percepts[number].numbers))
-    for number in order:
+    for place, number in enumerate(order):
         possible = percepts[number]
-        stays = belief._replace(log_weights=belief.log_weights + possible.log_none)
+        others = [percepts[other].percept for other in order[:place]]
+        seen_m2 = nearest_seen_m2(possible.percept, others)
+        nearest_m2 = np.minimum(nearest_known_m2(belief, possible), seen_m2)
+        log_none = possible.log_none + log_crowding(possible.percept, nearest_m2)
+        stays = belief._replace(log_weights=belief.log_weights + log_none)
 
         # Each object with each association that has not given it to another percept.
         is_taken = (chosen == possible.numbers[:, None, None]).any(axis=2)
         which, rows = np.nonzero(~is_taken)
+        sources = belief.sources[rows]
         after = seen(
-            belief.take(rows), possible.percept, possible.places_m[which], possible.own_m2[which]
+            belief.take(rows),
+            possible.percept,
+            possible.places_m[sources, which],
+            possible.own_m2[sources, which],
         )
         log_weights = after.log_weights + possible.log_likeness[which]
 
@@ -103,6 +87,7 @@ def associate(percepts: Sequence[Possible], belief: Belief) -> Association:
             means=np.concatenate([stays.means, after.means])[best],
             covariances=np.concatenate([stays.covariances, after.covariances])[best],
             log_weights=log_weights[best],
+            sources=np.concatenate([stays.sources, after.sources])[best],
         )
         every = np.arange(len(chosen))
         given = np.concatenate([np.full(len(chosen), NONE), possible.numbers[which]])
@@ -116,13 +101,15 @@ def associate(percepts: Sequence[Possible], belief: Belief) -> Association:
 
     objects = np.full(len(percepts), NONE, np.int64)
     probability = np.ones(len(percepts))
+    shares_of: list[dict[int, float]] = [{} for _ in percepts]
     for place, number in enumerate(order):
         values, which = np.unique(chosen[:, place], return_inverse=True)
         totals = np.bincount(which, shares)
         objects[number] = values[totals.argmax()]
         probability[number] = min(float(totals.max()), 1.0)
+        shares_of[number] = dict(zip(values.tolist(), totals.tolist(), strict=True))
 
-    return Association(objects, probability, log_evidence)
+    return Association(objects, probability, shares_of, log_evidence)
 
 
 def seen(belief: Belief, percept: Percept, places_m: Floats, own_m2: Floats) -> Belief:
@@ -172,7 +159,7 @@ def seen(belief: Belief, percept: Percept, places_m: Floats, own_m2: Floats) -> 
     gain = belief.covariances @ change.mT @ np.linalg.inv(doubted)
     means = belief.means + np.einsum("hpd,hd->hp", gain, innovation)
     covariances = belief.covariances - gain @ change @ belief.covariances
-    return Belief(
+    return belief._replace(
         means=means,
         covariances=(covariances + covariances.mT) / 2,
         log_weights=belief.log_weights + log_ratio,

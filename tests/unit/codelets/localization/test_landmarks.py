@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from cogmap.schemas.nodes import Object
+from cogmap.schemas.nodes import Object, PathIntegration
 from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.localization.information import INDEPENDENT_RAD, new_view_share
 from cogmap.services.codelets.localization.landmarks import MISSES
@@ -28,11 +28,13 @@ def _seen(
     config: Config = CONFIG,
     *,
     pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    bearing_sd_rad: float = 0.02,
+    **facts: object,
 ) -> Object:
-    """The landmark after it was seen from there."""
-    facts = dict(zip(("x_m", "y_m", "heading_rad"), pose, strict=True))
-    here = agent(np.tile(pose, (200, 1)), **facts)
-    seen = percept("house", bearing_rad, range_m, bearing_sd_rad=0.02, range_sd_m=0.4)
+    """The landmark after it was seen from there, by an agent of which there are these `facts`."""
+    at = dict(zip(("x_m", "y_m", "heading_rad"), pose, strict=True))
+    here = agent(np.tile(pose, (200, 1)), **at, **facts)
+    seen = percept("house", bearing_rad, range_m, bearing_sd_rad=bearing_sd_rad, range_sd_m=0.4)
     asked = task("landmark", identifier=f"{number}/landmark", percepts=[seen])
     found, _ = run(asked, graph_of(here, known), config).operations
     assert isinstance(found, Object)
@@ -63,6 +65,30 @@ def test_a_landmarks_samples_become_the_exact_gaussian_posterior_of_eq_4() -> No
     precision = prior + sensed
     assert found.x_m == pytest.approx((prior * 10 + sensed * 11) / precision, abs=0.03)
     assert found.x_sd_m == pytest.approx(precision**-0.5, rel=0.1)
+
+
+def test_a_landmark_keeps_how_it_was_seen_last_by_path_integration() -> None:
+    path = PathIntegration(x_m=3.0, y_m=4.0, heading_rad=math.pi / 2, variance_m2=0.5)
+    found = _seen(house(10.0, 0.0, 1.0), 0.0, 11.0, odometry=path, range_gain=0.1)
+    sighting = found.last_sighting
+
+    assert sighting is not None
+    assert (sighting.x_m, sighting.y_m) == pytest.approx((3.0, 14.0))
+    assert sighting.odometry == path
+
+
+def test_a_landmark_seen_by_range_alone_is_not_tracked() -> None:
+    assert _seen(house(10.0, 0.0, 1.0), 0.0, 10.0, bearing_sd_rad=7.0).last_sighting is None
+
+
+def test_a_landmark_shares_the_error_of_the_surest_pose_that_it_was_seen_from() -> None:
+    placed = _seen(house(10.0, 0.0, 1.0, sightings=0), 0.0, 10.0, x_sd_m=0.3, y_sd_m=0.4)
+    less_sure = _seen(placed, 0.0, 10.0, 1, x_sd_m=3.0, y_sd_m=4.0)
+    surer = _seen(less_sure, 0.0, 10.0, 2, x_sd_m=0.03, y_sd_m=0.04)
+
+    assert placed.shared_variance_m2 == pytest.approx(0.25)
+    assert less_sure.shared_variance_m2 == pytest.approx(0.25)
+    assert surer.shared_variance_m2 == pytest.approx(0.0025)
 
 
 def test_the_number_of_a_landmarks_samples_stays() -> None:

@@ -66,7 +66,7 @@ def _entered(
     """The percepts as they enter the map of an agent that knows these objects."""
     individuals = Individuals(graph_of(looker or agent(), *known))
     individuals.known.restore()
-    return individuals.labelled(percepts(frame, *seen), motions).objects
+    return individuals.labelled(percepts(frame, *seen), motions).percepts.objects
 
 
 def _labels(
@@ -88,7 +88,7 @@ def test_what_is_seen_first_is_new() -> None:
 
 def test_before_the_agent_has_a_place_every_percept_is_of_a_new_object() -> None:
     individuals = Individuals(graph_of())
-    entered = individuals.labelled(percepts(0, _sight("inn", 20.0, 0.0)), STILL)
+    entered = individuals.labelled(percepts(0, _sight("inn", 20.0, 0.0)), STILL).percepts
 
     assert [each.label for each in entered.objects] == [NEW]
 
