@@ -123,9 +123,8 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     position, `misses` that of views in a row that do not. One that is `surveyed` was given, and
     stays where it is. `last_seen_ns` and `created_ns` are times of views; `seen_from_m` is where
     the agent stood in the last one, relative to the object, and `last_sighting` how it saw it, if
-    by range and bearing. `shared_variance_m2` is how uncertain the agent's position was when it
-    placed the object: both share that error. `function` is what it is used for, such as "shop",
-    empty if that is unknown.
+    by range and bearing. `function` is what it is used for, such as "shop", empty if that is
+    unknown.
     """
 
     label: Name
@@ -145,7 +144,6 @@ class Object(GraphNode, kw_only=True, frozen=True, tag="object"):
     last_seen_ns: Stamp = NEVER_NS
     seen_from_m: tuple[Finite, Finite] | None = None
     last_sighting: Sighting | None = None
-    shared_variance_m2: Spread = 0.0
     created_ns: Stamp = 0
     surveyed: bool = False
     offsets_m: Matrix | None = None

@@ -126,7 +126,6 @@ def merged(kept: Object, gone: Object) -> Object:
         sightings=kept.sightings + gone.sightings,
         last_seen_ns=last_seen.last_seen_ns,
         last_sighting=last_seen.last_sighting,
-        shared_variance_m2=min(kept.shared_variance_m2, gone.shared_variance_m2),
         created_ns=min(kept.created_ns, gone.created_ns),
     )
 

@@ -2,8 +2,7 @@
 
 A landmark was placed from where the agent took itself to be, and shares the error of that. It can
 correct only the error that came since; taken for independent, it would pull the agent after its own
-mistakes. (In a filter of the joint state their correlation does this.) However often it is seen,
-the agent does not learn the error that it had when it placed it.
+mistakes. (In a filter of the joint state their correlation does this.)
 
 Neither is a view new that is from where the view before was: it errs as that did, since it shows
 the same walls, as far away.
@@ -22,6 +21,7 @@ from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import NEVER_NS, Object, PathColumn, PathSegment, object_id
 from cogmap.services.codelets.localization.measurement_model import Measurements
+from cogmap.services.codelets.localization.sampling import centred
 
 VARIANCES = slice(PathColumn.VARIANCE_M2, PathColumn.VARIANCE_RAD2 + 1)
 INDEPENDENT_RAD = 0.2
@@ -34,10 +34,6 @@ AROUND_RAD = 2 * math.pi
 """Change of viewpoint after which a building informs the agent anew: it stands where all that was
 seen of it says, so that its own error is the same from all round."""
 
-SMALLEST_M2 = 1e-9
-LARGEST_M2 = 1e9
-"""Of a variance; shares stay defined."""
-
 MIN_DISTANCE_M = 0.1
 """Nothing is seen from nearer; a change of viewpoint stays defined."""
 
@@ -45,17 +41,19 @@ STAMP_FORMAT = struct.Struct("<d")
 STAMP_OFFSET = PathColumn.STAMP_S * STAMP_FORMAT.size
 
 
-def new_share(seen: Measurements, since: Floats, shared_m2: Floats) -> Floats:
-    """Compute the share, 0 to 1, of the uncertainty of the agent's position that came since each
-    landmark was placed, (k,). `since` (k, 2) states how much path integration's variances, in m^2
-    and rad^2, have grown since then, `shared_m2` (k,) how uncertain the agent's position was then:
-    that is the landmark's error too, and no view of it tells of that.
+def new_share(samples: Floats, seen: Measurements, since: Floats) -> Floats:
+    """Compute the share, 0 to 1, of the uncertainty of (n, 7) samples' position that came since
+    each landmark was placed, (k,). `since` (k, 2) states how much path integration's variances, in
+    m^2 and rad^2, have grown since then.
     """
+    _, deviations = centred(samples[:, :2])
+    variances_m2 = np.square(deviations).mean(axis=0)
+    position_m2 = max(float(variances_m2.sum()), 1e-9)
+
     since_m2, since_rad2 = since.T
-    came_m2 = 2 * since_m2 + since_rad2 * seen.range_m**2
-    came_m2 = came_m2.clip(0.0, LARGEST_M2)
-    share: Floats = came_m2 / np.maximum(came_m2 + shared_m2, SMALLEST_M2)
-    return share
+    by_turns_m2 = since_rad2 * seen.range_m**2
+    share: Floats = (2 * since_m2 + by_turns_m2) / position_m2
+    return share.clip(0.0, 1.0)
 
 
 def new_look_share(seen: Measurements, motions: Floats) -> Floats:

@@ -301,15 +301,10 @@ def refreshed(
     )
     agent = graph.agent
     if agent is not None:
-        shared_m2 = agent.x_sd_m**2 + agent.y_sd_m**2
-        if before.sightings and before.created_ns == after.created_ns:
-            shared_m2 = min(shared_m2, before.shared_variance_m2)
-
         node = msgspec.structs.replace(
             node,
             seen_from_m=(agent.x_m - node.x_m, agent.y_m - node.y_m),
             last_sighting=sighting_of(percept, agent),
-            shared_variance_m2=shared_m2,
         )
 
     place = nearest_place(node.x_m, node.y_m, graph.cell_m(node.map), node.map)

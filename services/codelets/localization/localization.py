@@ -123,11 +123,10 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     seen = measurements(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
     if seen is not None:
         since = variances - variances_when_placed(graph, seen)
-        landmarks = nodes_of(graph, Object, map(object_id, seen.labels))
-        shared_m2 = np.array([node.shared_variance_m2 for node in landmarks])
-        weights = new_share(seen, since, shared_m2)
+        weights = new_share(moved, seen, since)
         if config.landmarks == "buildings":
             agent_m = moved[:, :2].mean(axis=0)
+            landmarks = nodes_of(graph, Object, map(object_id, seen.labels))
             weights *= [new_view_share(each, agent_m, AROUND_RAD) for each in landmarks]
         weights *= np.where(seen.is_told, 1.0, new_look_share(seen, motions))
         weights = np.minimum.reduceat(weights, seen.firsts)

@@ -85,8 +85,12 @@ def test_a_speed_that_makes_no_sense_is_limited(playback: Playback) -> None:
 def test_damage_is_said_and_what_is_before_it_is_shown(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     content = bytearray(REFERENCE.read_bytes())
-    chunk = read_index(REFERENCE).chunks[-1]
-    content[chunk.offset + 200] ^= 0xFF
+    index = read_index(REFERENCE)
+    of_deltas = frozenset(
+        number for number, channel in index.channels.items() if channel.topic.endswith("delta")
+    )
+    with_deltas = [chunk for chunk in index.chunks if chunk.has_any(of_deltas)]
+    content[with_deltas[-1].offset + 200] ^= 0xFF
     path.write_bytes(content)
     source = Playback(path)
     try:

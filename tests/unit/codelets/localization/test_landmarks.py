@@ -81,16 +81,6 @@ def test_a_landmark_seen_by_range_alone_is_not_tracked() -> None:
     assert _seen(house(10.0, 0.0, 1.0), 0.0, 10.0, bearing_sd_rad=7.0).last_sighting is None
 
 
-def test_a_landmark_shares_the_error_of_the_surest_pose_that_it_was_seen_from() -> None:
-    placed = _seen(house(10.0, 0.0, 1.0, sightings=0), 0.0, 10.0, x_sd_m=0.3, y_sd_m=0.4)
-    less_sure = _seen(placed, 0.0, 10.0, 1, x_sd_m=3.0, y_sd_m=4.0)
-    surer = _seen(less_sure, 0.0, 10.0, 2, x_sd_m=0.03, y_sd_m=0.04)
-
-    assert placed.shared_variance_m2 == pytest.approx(0.25)
-    assert less_sure.shared_variance_m2 == pytest.approx(0.25)
-    assert surer.shared_variance_m2 == pytest.approx(0.0025)
-
-
 def test_the_number_of_a_landmarks_samples_stays() -> None:
     found = _seen(house(10.0, 0.0, 0.5), 0.0, 10.0)
 

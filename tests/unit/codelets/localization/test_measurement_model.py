@@ -19,9 +19,6 @@ from cogmap.services.codelets.mapping.path import segments
 from cogmap.testing import graph_of, landmark, percept
 
 RANGE_M = 10.0
-SHARED_M2 = 0.5
-"""How uncertain the agent's position was when it placed the landmark."""
-
 AGENT_SD_M = 0.5
 
 
@@ -47,9 +44,9 @@ def _seen() -> Measurements:
     ("since", "share"),
     [
         ((0.0, 0.0), 0.0),
-        ((0.1, 0.0), 0.2 / (0.2 + SHARED_M2)),
-        ((0.0, 1e-3), 1e-3 * RANGE_M**2 / (1e-3 * RANGE_M**2 + SHARED_M2)),
-        ((1e3, 0.0), 1.0),
+        ((0.1, 0.0), 0.1 / AGENT_SD_M**2),
+        ((0.0, 1e-3), 1e-3 * RANGE_M**2 / (2 * AGENT_SD_M**2)),
+        ((9.0, 0.0), 1.0),
         ((math.inf, math.inf), 1.0),
     ],
     ids=["just now", "distance since", "turns since", "long ago", "before the path"],
@@ -57,9 +54,9 @@ def _seen() -> Measurements:
 def test_a_landmark_informs_by_the_uncertainty_since_it_was_placed(
     since: tuple[float, float], share: float
 ) -> None:
-    found = new_share(_seen(), np.array([since]), np.array([SHARED_M2]))
+    found = new_share(_agent(), _seen(), np.array([since]))
 
-    assert found == pytest.approx([share], rel=0.01)
+    assert found == pytest.approx([share], rel=0.1)
 
 
 def test_the_variance_when_a_landmark_was_placed_is_that_of_the_path() -> None:
