@@ -38,7 +38,7 @@ from cogmap.services.workspace.association.crowding import (
 from cogmap.services.workspace.association.joint import NONE, associate
 from cogmap.services.workspace.association.known_objects import KnownObjects
 from cogmap.services.workspace.association.looks import Look, look_of
-from cogmap.services.workspace.association.tracking import tracked
+from cogmap.services.workspace.association.tracking import mapped, tracked
 
 NEAR_M = 12.0
 """An object stands at most so far from where a percept of it is seen, beside what is uncertain."""
@@ -158,31 +158,33 @@ class Individuals:
         self, seen: Sequence[Percept], looks: Sequence[Look], agent: Self, belief: Belief
     ) -> tuple[list[Object], list[Possible]]:
         """Find the objects that each percept may be of, and how much it looks like them."""
-        candidates: list[Object] = []
-        number_of: dict[str, int] = {}
-        possible = []
-        for percept, look in zip(seen, looks, strict=True):
-            nodes = self._in_reach(percept, agent, belief)
-            for node in nodes:
-                if node.label not in number_of:
-                    number_of[node.label] = len(candidates)
-                    candidates.append(node)
+        candidates: dict[str, Object] = {}
+        in_reach = [self._in_reach(percept, agent, belief) for percept in seen]
+        for near in in_reach:
+            candidates |= {node.label: node for node in near}
 
-            likenesses = np.array([P_SEEN * likeness(percept, node) for node in nodes])
-            tracked_m, tracked_m2 = tracked(nodes, agent, belief.covariances[Source.MAPPED])
-            mapped_m = np.array([(node.x_m, node.y_m) for node in nodes]).reshape(-1, 2)
-            mapped_m2 = np.array([node.covariance_m2() for node in nodes]).reshape(-1, 2, 2)
+        known = list(candidates.values())
+        number_of = {label: number for number, label in enumerate(candidates)}
+        on_map = mapped(known)
+        by_path = tracked(known, on_map, agent, belief.covariances[Source.MAPPED])
+        places_m = np.stack([by_path.mean_m, on_map.mean_m])
+        own_m2 = np.stack([by_path.covariance_m2, on_map.covariance_m2])
+
+        possible = []
+        for percept, look, near in zip(seen, looks, in_reach, strict=True):
+            numbers = np.array([number_of[node.label] for node in near], np.int64)
+            likenesses = np.array([P_SEEN * likeness(percept, node) for node in near])
             one = Possible(
                 percept=percept,
-                places_m=np.stack([tracked_m, mapped_m]),
-                own_m2=np.stack([tracked_m2, mapped_m2]),
-                numbers=np.array([number_of[node.label] for node in nodes], np.int64),
+                places_m=places_m[:, numbers],
+                own_m2=own_m2[:, numbers],
+                numbers=numbers,
                 log_likeness=np.log(likenesses),
                 log_none=math.log((NEW_PER_VIEW + MISTAKES_PER_VIEW) * look.of_another),
             )
             possible.append(one)
 
-        return candidates, possible
+        return known, possible
 
     def _in_reach(self, percept: Percept, agent: Self, belief: Belief) -> list[Object]:
         """Return the objects of the agent's map that stand where a percept may be of them, the

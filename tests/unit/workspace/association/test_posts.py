@@ -12,7 +12,7 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.nodes import Object, PathIntegration, Self, Sighting
 from cogmap.schemas.sensing import Percept
 from cogmap.services.workspace.association.individuals import Associated, Individuals
-from cogmap.services.workspace.association.tracking import tracked
+from cogmap.services.workspace.association.tracking import mapped, tracked
 from cogmap.testing import agent, graph_of, landmark, percept_at, percepts, unidentified
 
 STILL = Array.of(np.zeros((0, 5)))
@@ -125,11 +125,12 @@ def test_what_was_seen_long_ago_stands_where_the_map_has_it() -> None:
     node = _post("0a", *first_m, last_sighting=_seen_from_start(*second_m))
     drifted = agent(odometry=PathIntegration(variance_m2=1.0, variance_rad2=0.1))
     surely = np.zeros((3, 3))
-    now_m, _ = tracked([node], agent(), np.eye(3))
-    later_m, _ = tracked([node], drifted, surely)
+    on_map = mapped([node])
+    now = tracked([node], on_map, agent(), np.eye(3))
+    later = tracked([node], on_map, drifted, surely)
 
-    assert now_m == pytest.approx(np.array([second_m]))
-    assert later_m == pytest.approx(np.array([first_m]))
+    assert now.mean_m == pytest.approx(np.array([second_m]))
+    assert later.mean_m == pytest.approx(np.array([first_m]))
 
 
 def test_path_integration_leads_from_where_it_was_seen_to_where_it_is_seen_now() -> None:
