@@ -28,6 +28,10 @@ MIN_VARIANCE = 1e-6
 """In square metres and radians: less than any pose is known to, so that matrices have inverses."""
 
 
+BELIEVED = 1
+"""Which of the three ways in which a pose is believed is as its samples are."""
+
+
 class Source(IntEnum):
     """By what it is known where an object stands to the agent."""
 

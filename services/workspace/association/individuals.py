@@ -24,10 +24,10 @@ from cogmap.schemas.array import Array
 from cogmap.schemas.nodes import Object, Self, individual_label
 from cogmap.schemas.sensing import Percept, Percepts
 from cogmap.services.workspace.association.beliefs import (
+    BELIEVED,
     FARTHEST_M,
     Belief,
     Possible,
-    Source,
     belief_of,
 )
 from cogmap.services.workspace.association.crowding import (
@@ -166,7 +166,8 @@ class Individuals:
         known = list(candidates.values())
         number_of = {label: number for number, label in enumerate(candidates)}
         on_map = mapped(known)
-        by_path = tracked(known, on_map, agent, belief.covariances[Source.MAPPED])
+        by_path = tracked(known, on_map, agent, belief.covariances[BELIEVED])
+        # In the order of Source.
         places_m = np.stack([by_path.mean_m, on_map.mean_m])
         own_m2 = np.stack([by_path.covariance_m2, on_map.covariance_m2])
 
@@ -223,7 +224,7 @@ class Individuals:
 
 def as_entered(percepts: Percepts, graph: Graph) -> Percepts:
     """Return `percepts` by the labels with which they entered the graph in this cycle, before the
-    workspace was interrupted.
+    workspace was interrupted. Those that waited inform this cycle no more.
     """
     label_of = {}
     for node in graph.of_kind(nodes.Percept):
