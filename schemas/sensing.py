@@ -115,9 +115,7 @@ class Percept(Part, kw_only=True, frozen=True):
     activation of its PAM node, `evidence` how likely the views make it, whatever was
     expected, and `names` how likely it makes other names. `label` is that of the individual object
     that it is of, and `certainty` how likely it is of that one: the workspace finds it, unless what
-    perceives knows it, as by a barcode. While it cannot be told yet, `candidates` are those that it
-    may be of, each with how likely its look alone makes it that one, and `certainty` is how likely
-    it is of any of them.
+    perceives knows it, as by a barcode.
     Bearing (left positive) and range point to the object's estimated centre; `whole` says that
     neither image border nor another object cuts it. `box_px` is left, top, width, height in the
     view; `outline_px` are the corners, column and row, of a polygon around what is seen of it.
@@ -129,7 +127,6 @@ class Percept(Part, kw_only=True, frozen=True):
     names: dict[Name, Unit] = {}
     label: str = ""
     appearance: Appearance | None = None
-    candidates: dict[Name, Unit] = {}
     certainty: Unit = 1.0
     activation: Unit
     evidence: Unit

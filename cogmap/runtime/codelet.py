@@ -27,7 +27,8 @@ Written = type[GraphNode] | LinkKind | PlaceColumn
 class CycleContext:
     """What a cognitive cycle is about: a view's percepts, the self-motion since the self node was
     last moved at `since_ns`, as in SelfMotion, and the range scan of the view, where there is one.
-    Percepts that are `waiting` are of known objects, but it cannot be told yet of which.
+    Percepts that are `waiting` are of known objects, but it cannot be told yet of which: each has
+    the label of the likeliest, and states its place as badly as the others stand from that.
     """
 
     cycle: int

@@ -56,17 +56,6 @@ def new_share(samples: Floats, seen: Measurements, since: Floats) -> Floats:
     return share.clip(0.0, 1.0)
 
 
-def new_look_share(seen: Measurements, motions: Floats) -> Floats:
-    """Compute the share, 0 to 1, of a look at things that cannot be told apart that the look
-    before, (n, 5) `motions` ago, has not told, (k,): from nearly the same viewpoint the same one is
-    taken for another again.
-    """
-    speeds = np.abs(motions[:, :2])
-    way_m, turned_rad = speeds.T @ motions[:, 2]
-    share: Floats = (way_m / seen.range_m + turned_rad) / INDEPENDENT_RAD
-    return share.clip(0.0, 1.0)
-
-
 def new_view_share(landmark: Object, agent_m: Floats, independent_rad: float) -> float:
     """Compute the share, 0 to 1, of a view of a landmark from (2,) that the last view of it has not
     told: the way between both over the distance, of `independent_rad`, after which they err

@@ -38,7 +38,6 @@ from cogmap.schemas.nodes import (
 from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.localization.information import (
     AROUND_RAD,
-    new_look_share,
     new_share,
     new_view_share,
     variances_when_placed,
@@ -128,8 +127,6 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
             agent_m = moved[:, :2].mean(axis=0)
             landmarks = nodes_of(graph, Object, map(object_id, seen.labels))
             weights *= [new_view_share(each, agent_m, AROUND_RAD) for each in landmarks]
-        weights *= np.where(seen.is_told, 1.0, new_look_share(seen, motions))
-        weights = np.minimum.reduceat(weights, seen.firsts)
         found = correct(found, seen, weights, config, rng)
         away_m2 = agent.odometry.x_m**2 + agent.odometry.y_m**2
         path_m2 = float(variances[0]) + float(variances[1]) * away_m2
@@ -178,22 +175,22 @@ CODELET = Codelet(
 def correct(
     past: Estimate, seen: Measurements, weights: Floats, config: Config, rng: np.random.Generator
 ) -> Estimate:
-    """Reject samples by what is in view, each percept by its weight (p,).
+    """Reject samples by what is in view, each landmark by its weight (k,).
 
-    If most of what is told fits no sample, all are kept, until the agent must be elsewhere. If
-    rejection would keep too few, it is done in stages: each by a part of the likelihood, the
-    product of all parts being the whole, from samples as many as before, drawn around those that
-    the stage before has kept. Stages cannot follow a heading that may be any: then the landmarks
-    that are told determine which headings are tried.
+    If most of that fits no sample, all are kept, until the agent must be elsewhere. If rejection
+    would keep too few, it is done in stages: each by a part of the likelihood, the product of all
+    parts being the whole, from samples as many as before, drawn around those that the stage before
+    has kept. Stages cannot follow a heading that may be any: then the landmarks determine which
+    headings are tried.
     """
     headings_rad = past.samples[:, 2]
     length = np.hypot(np.cos(headings_rad).mean(), np.sin(headings_rad).mean())
     is_heading_known = np.ptp(headings_rad) <= TURNED_RAD or length >= ALIKE
-    if not is_heading_known and seen.told().has_bearing.any():
-        return Estimate(relocalize_heading(past.samples, seen.told(), rng), 0.0)
+    if seen.has_bearing.any() and not is_heading_known:
+        return Estimate(relocalize_heading(past.samples, seen, rng), 0.0)
 
     compared = compare(past.samples, seen)
-    counts = (seen.weights * seen.is_told[seen.firsts]).astype(np.float32)
+    counts = seen.weights.astype(np.float32)
     fitting = (counts @ (compared.squared < GATE**2)).max()
     if 2 * fitting < counts.sum():
         return misfit(past, seen)

@@ -5,12 +5,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.geometry.arrays import Booleans, Floats, Indices, Singles
+from cogmap.geometry.arrays import Booleans, Floats, Singles
 from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import NEVER_NS, Object, object_id
 from cogmap.schemas.sensing import Percept
@@ -36,15 +36,12 @@ MAX_MAHALANOBIS2 = np.float32(150.0)
 
 
 class Measurements(NamedTuple):
-    """p percepts of known landmarks, k rows: where each landmark is believed to be that a percept
-    may be of, and where it is seen. A percept that is told has one row; the rows of another follow
-    each other.
+    """k known landmarks in view: where each is believed to be and where it is seen.
 
     `mean_m` (k, 2) and `covariance_m2` (k, 2, 2) are of the landmark on the map; the rest, (k,)
-    each, of the percept. `certainty` is how likely it is of that landmark, or of any of those that
-    it may be of; `percept` is its number, 0 to p - 1, `share` how likely its look alone makes it of
-    that landmark, and `is_told` states whether it is told of which it is. A bearing is unknown if
-    its standard deviation is at least a half turn, a range if it is at least the range.
+    each, of the percept; `certainty` is how likely it is of that landmark. A bearing is
+    unknown if its standard deviation is at least a half turn, a range if it is at least the
+    range.
     """
 
     labels: tuple[str, ...]
@@ -55,39 +52,13 @@ class Measurements(NamedTuple):
     bearing_sd_rad: Floats
     range_sd_m: Floats
     certainty: Floats
-    percept: Indices
-    share: Floats
-    is_told: Booleans
-
-    @property
-    def firsts(self) -> Indices:
-        """Return the first row of each percept, (p,)."""
-        return np.flatnonzero(np.diff(self.percept, prepend=-1))
-
-    def told(self) -> Measurements:
-        """Return the percepts of which it is told of which landmark they are."""
-        rows = np.flatnonzero(self.is_told)
-        return Measurements(
-            labels=tuple(self.labels[row] for row in rows.tolist()),
-            mean_m=self.mean_m[rows],
-            covariance_m2=self.covariance_m2[rows],
-            bearing_rad=self.bearing_rad[rows],
-            range_m=self.range_m[rows],
-            bearing_sd_rad=self.bearing_sd_rad[rows],
-            range_sd_m=self.range_sd_m[rows],
-            certainty=self.certainty[rows],
-            percept=np.arange(len(rows)),
-            share=self.share[rows],
-            is_told=self.is_told[rows],
-        )
 
     @property
     def weights(self) -> Floats:
-        """Return how much each percept counts for or against a pose that it fits or does not fit,
-        (p,), 0 to 1: the logarithm of how likely it is of another landmark, over that of a sure
-        one.
+        """Return how much each counts for or against a pose that it fits or does not fit, (k,), 0
+        to 1: the logarithm of how likely it is of another landmark, over that of a sure one.
         """
-        doubts = 1 - self.certainty[self.firsts].clip(0.0, SURE)
+        doubts = 1 - self.certainty.clip(0.0, SURE)
         weights: Floats = np.log(doubts) / np.log(1 - SURE)
         return weights
 
@@ -103,11 +74,10 @@ class Measurements(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """How well n samples of the self explain p percepts, (p, n) each, single precision.
+    """How well n samples of the self explain k landmarks in view, (k, n) each, single precision.
 
-    `squared` is the squared Mahalanobis distance, of the nearest landmark that a percept may be of;
-    `density` is relative to that of an exact match with a landmark whose position is certain, and
-    the mean over those that it may be of, by their shares.
+    `squared` is the squared Mahalanobis distance; `density` is relative to that of an exact match
+    with a landmark whose position is certain.
     """
 
     squared: Singles
@@ -155,11 +125,6 @@ def compare(samples: Floats, seen: Measurements) -> Comparison:
     peak = np.where(seen.has_bearing, seen.bearing_sd_rad**2 / bearing_var, 1.0)
     peak *= np.where(seen.has_range, seen.range_sd_m**2 / range_var, 1.0)
     density *= _single(np.sqrt(peak))[:, None]
-
-    firsts = seen.firsts
-    if len(firsts) < len(seen.labels):
-        squared = np.minimum.reduceat(squared, firsts)
-        density = np.add.reduceat(density * _single(seen.share)[:, None], firsts)
     return Comparison(squared, density)
 
 
@@ -168,8 +133,8 @@ def _single(numbers: Floats) -> Singles:
 
 
 def log_likelihood(density: Singles, weights: Floats | None = None) -> Floats:
-    """Compute the logarithm of the product over landmarks of p(o_j | l_j, x), (n,), from (p, n)
-    densities (eq. 1), each to the power of its weight (p,), or of 1.
+    """Compute the logarithm of the product over landmarks of p(o_j | l_j, x), (n,), from (k, n)
+    densities (eq. 1), each to the power of its weight (k,), or of 1.
 
     OUTLIER_SHARE of the percepts may mean anything, so that a landmark taken for another does not
     outvote the rest.
@@ -196,13 +161,10 @@ def measurements(
     agent has stood since `stationary_since_ns`: the same view again is no new evidence.
     """
     chosen: list[Percept] = []
-    labels = []
-    numbers = []
-    shares = []
     means_m = []
     covariances_m2 = []
-    for number, percept, label, share in _possible(percepts):
-        node = graph.get(Object, object_id(label))
+    for percept in percepts:
+        node = graph.get(Object, object_id(percept.label))
         if node is None or not (node.surveyed or node.sightings >= MIN_SIGHTINGS):
             continue
         if is_seen_from_here(node, stationary_since_ns):
@@ -218,9 +180,6 @@ def measurements(
             limit_m = min(limit_m, MAX_SD_SHARE * percept.range_m)
         if float(covariance_m2[0, 0] + covariance_m2[1, 1]) <= 2 * limit_m**2:
             chosen.append(percept)
-            labels.append(label)
-            numbers.append(number)
-            shares.append(share)
             means_m.append(mean_m)
             covariances_m2.append(covariance_m2)
 
@@ -228,7 +187,7 @@ def measurements(
         return None
 
     return Measurements(
-        labels=tuple(labels),
+        labels=tuple(percept.label for percept in chosen),
         mean_m=np.array(means_m),
         covariance_m2=np.array(covariances_m2),
         bearing_rad=np.array([percept.bearing_rad for percept in chosen]),
@@ -236,19 +195,7 @@ def measurements(
         bearing_sd_rad=np.array([percept.bearing_sd_rad for percept in chosen]),
         range_sd_m=np.array([percept.range_sd_m for percept in chosen]),
         certainty=np.array([percept.certainty for percept in chosen]),
-        percept=np.unique(numbers, return_inverse=True)[1],
-        share=np.array(shares),
-        is_told=np.array([not percept.candidates for percept in chosen]),
     )
-
-
-def _possible(percepts: Iterable[Percept]) -> Iterator[tuple[int, Percept, str, float]]:
-    """Yield each percept with its number, the label of each object that it may be of, and how
-    likely its look alone makes it that one.
-    """
-    for number, percept in enumerate(percepts):
-        for label, share in (percept.candidates or {percept.label: 1.0}).items():
-            yield number, percept, label, share
 
 
 def is_seen_from_here(node: Object, stationary_since_ns: int) -> bool:

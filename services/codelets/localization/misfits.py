@@ -72,9 +72,8 @@ def misfit(past: Estimate, seen: Measurements) -> Estimate:
     agent is elsewhere; one that does not fit for long stands elsewhere, or is another.
     """
     count = past.misfit_count + 1
-    labels = seen.told().labels
-    first = past.first_misfit or labels[0]
-    is_lost = past.is_lost or any(label != first for label in labels)
+    first = past.first_misfit or seen.labels[0]
+    is_lost = past.is_lost or any(label != first for label in seen.labels)
     is_landmark = not is_lost and count >= MISFITS_TO_RELOCALIZE
     return Estimate(past.samples, 0.0, count, first, is_lost, is_not_elsewhere=is_landmark)
 
@@ -105,10 +104,9 @@ def recent_percepts(
         # Path integration does not lead from what was seen before it was found to what it sees now.
         since_ns = max(task.stamp_ns - RECENT_NS, agent.misfits.found_ns)
 
-    told = [percept for percept in task.percepts if percept.label]
-    in_view = {percept.label for percept in told}
+    in_view = {percept.label for percept in task.percepts}
     before = seen_before(graph, odometry, since_ns)
-    recent = [*told, *(percept for percept in before if percept.label not in in_view)]
+    recent = [*task.percepts, *(percept for percept in before if percept.label not in in_view)]
     return [percept for percept in recent if percept.whole or found.is_lost]
 
 

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
+from cogmap.geometry.se2 import rotate
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import OVERLAP
 from cogmap.graph.likeness import is_new_side, likeness
@@ -62,8 +63,8 @@ now and then."""
 P_IS_HERE = 20.0
 """The agent is where it believes if what it sees is so many times likelier there than elsewhere."""
 
-UNLIKELY = 1e-3
-"""An object that a percept is less likely of is no candidate for it."""
+LARGEST_SD_RAD = 6.0
+"""A bearing that is less certain states nothing either."""
 
 MAX_CANDIDATES = 8
 """Objects that a percept is compared with at most: the nearest."""
@@ -85,7 +86,7 @@ more, more of the buildings are on the map and fewer of these right: in three to
 
 class Associated(NamedTuple):
     """A view's percepts, each with the label of the object that it is of, and those that wait: each
-    is of one of its candidates, but it cannot be told yet of which.
+    is of a known object, but it cannot be told yet of which, and is labelled as of the likeliest.
     """
 
     percepts: Percepts
@@ -135,7 +136,7 @@ class Individuals:
             if probability < CERTAIN:
                 shares = found.shares[place]
                 if 1 - shares.get(NONE, 0.0) >= CERTAIN:
-                    waiting.append(_one_of(percept, possible[place], candidates, shares))
+                    waiting.append(_one_of(percept, candidates, shares, belief))
                 continue
 
             if number != NONE:
@@ -297,19 +298,30 @@ def _with_true_range(percept: Percept, range_gain: float) -> Percept:
 
 
 def _one_of(
-    percept: Percept, possible: Possible, known: Sequence[Object], shares: Mapping[int, float]
+    percept: Percept, known: Sequence[Object], shares: Mapping[int, float], belief: Belief
 ) -> Percept:
-    """Return a percept that is of one of the `known` objects, by number, that it may well be of:
-    each with how likely its look alone makes it that one.
+    """Label a percept as of the likeliest of the `known` objects, by number, that it may be of; it
+    states its place as badly as the others stand from that one, seen from the pose that is
+    believed.
     """
-    kept = np.array([shares.get(number, 0.0) > UNLIKELY for number in possible.numbers.tolist()])
-    likeness_of = np.exp(possible.log_likeness[kept])
-    likeness_of /= likeness_of.sum()
-    labels = [known[number].label for number in possible.numbers[kept].tolist()]
+    p_known = 1 - shares.get(NONE, 0.0)
+    numbers = [number for number in shares if number != NONE]
+    weights = np.array([shares[number] for number in numbers]) / p_known
+    likeliest = known[numbers[int(weights.argmax())]]
+
+    direction_rad = float(belief.means[0, 2]) + percept.bearing_rad
+    away_m = np.array([(known[each].x_m, known[each].y_m) for each in numbers])
+    away_m -= (likeliest.x_m, likeliest.y_m)
+    seen_m = rotate(away_m, -direction_rad)
+    along_m2, across_m2 = (weights @ np.square(seen_m)).tolist()
+
+    bearing_rad2 = percept.bearing_sd_rad**2 + across_m2 / percept.range_m**2
     return msgspec.structs.replace(
         percept,
-        candidates=dict(zip(labels, likeness_of.tolist(), strict=True)),
-        certainty=min(1.0, 1 - shares.get(NONE, 0.0)),
+        label=likeliest.label,
+        certainty=min(1.0, p_known),
+        range_sd_m=math.sqrt(percept.range_sd_m**2 + along_m2),
+        bearing_sd_rad=min(math.sqrt(bearing_rad2), LARGEST_SD_RAD),
         appearance=None,
     )
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import msgspec
 import numpy as np
 import pytest
 
@@ -13,7 +12,6 @@ from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
 from cogmap.schemas.graph import Link
 from cogmap.schemas.nodes import LinkKind, Self
-from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.config import Config
 from cogmap.testing import agent, graph_of, percept, task
 from tests.support.world.landmarks import (
@@ -168,47 +166,6 @@ def test_an_agent_that_stands_still_does_not_grow_surer_of_itself_by_looking() -
 
     assert looking(seen_ns=4) == pytest.approx(0.92, abs=0.05)
     assert looking(seen_ns=5) == pytest.approx(0.0, abs=0.05)
-
-
-def _either(*labels: str, bearing_rad: float, **facts: object) -> Percept:
-    """A percept of one of some landmarks ten metres away; it cannot be told of which."""
-    seen = percept("", bearing_rad, 10.0, **facts)
-    candidates = {label: 1 / len(labels) for label in labels}
-    return msgspec.structs.replace(seen, candidates=candidates)
-
-
-AHEAD = (house(10.0, 0.0, label="left"), house(10.0, -0.5, label="right"))
-TURNS = motions((0.0, 0.5, 1.0, 0.0, 0.0), (0.0, -0.5, 1.0, 0.0, 0.0))
-"""There and back: a look from here is as good as from elsewhere."""
-
-
-def test_a_percept_of_one_of_two_landmarks_leaves_the_headings_at_which_it_is_of_either() -> None:
-    turned = agent(normal_samples(0.0, 0.0, 0.06))
-    seen = _either("left", "right", bearing_rad=0.0, bearing_sd_rad=0.008)
-    found = samples_of(localized(turned, *AHEAD, motions=TURNS, percepts=[seen]))[:, 2]
-
-    to_right_rad = -math.atan2(0.5, 10.0)
-    is_left = np.abs(found) < 0.02
-    is_right = np.abs(found - to_right_rad) < 0.02
-    assert (is_left | is_right).mean() > 0.75
-    assert is_left.mean() > 0.3
-    assert is_right.mean() > 0.2
-
-
-def test_the_same_look_again_does_not_tell_which_of_two_landmarks_it_is() -> None:
-    still = motions((0.0, 0.0, 1.0, 0.0, 0.0))
-    turned = agent(normal_samples(0.0, 0.0, 0.2))
-    seen = _either("left", "right", bearing_rad=0.0, bearing_sd_rad=0.005)
-    found = localized(turned, *AHEAD, motions=still, percepts=[seen])
-
-    assert found.heading_sd_rad == pytest.approx(0.2, rel=0.1)
-
-
-def test_what_cannot_be_told_does_not_state_that_the_agent_is_lost() -> None:
-    seen = [_either("left", "right", bearing_rad=math.pi)]
-    found = localized(agent(), *AHEAD, motions=TURNS, percepts=seen)
-
-    assert found.misfits.count == 0
 
 
 @pytest.mark.parametrize("number", range(4))

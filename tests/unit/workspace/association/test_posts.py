@@ -70,15 +70,19 @@ def test_a_pair_that_is_known_is_told_by_an_agent_that_knows_where_it_is() -> No
     assert _labels(_associated(known, *seen)) == ["0a", "1a"]
 
 
-def test_what_is_seen_where_one_of_two_stands_waits_for_both_of_them() -> None:
+def test_what_may_be_of_two_waits_and_states_its_place_as_badly_as_both_stand_apart() -> None:
     known = [_post(f"{number}a", *at_m) for number, at_m in enumerate(_pair(5.0, 0.0))]
-    found = _associated(known, _sight(5.0, APART_M / 2, bearing_sd_rad=0.05))
+    seen = _sight(5.0, APART_M / 2, bearing_sd_rad=0.05)
+    found = _associated(known, seen)
     (waiting,) = found.waiting
 
     assert _labels(found) == []
-    assert waiting.label == ""
-    assert waiting.candidates == pytest.approx({"0a": 0.5, "1a": 0.5})
+    assert waiting.label in ("0a", "1a")
     assert waiting.certainty > 0.9
+    # Half of it is of the other one.
+    across_m2 = APART_M**2 / 2
+    assert waiting.bearing_sd_rad == pytest.approx(math.hypot(0.05, across_m2**0.5 / 5.0), rel=0.05)
+    assert waiting.range_sd_m == pytest.approx(seen.range_sd_m, rel=0.05)
 
 
 def test_what_may_as_well_be_of_nothing_that_is_known_does_not_wait_for_anything() -> None:
