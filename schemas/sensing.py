@@ -107,6 +107,10 @@ class Appearance(Part, kw_only=True, frozen=True):
     even_cosine: Annotated[float, msgspec.Meta(ge=-1, le=1)]
 
 
+MAX_BEARING_SD_RAD = 7.0
+"""A bearing that is known worse is stated so: it is unknown from a half turn on."""
+
+
 class Percept(Part, kw_only=True, frozen=True):
     """Something that is seen: what it may be called, what it looks like, and where it stands as
     seen from the robot.
@@ -132,7 +136,7 @@ class Percept(Part, kw_only=True, frozen=True):
     evidence: Unit
     bearing_rad: Finite
     range_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
-    bearing_sd_rad: Annotated[float, msgspec.Meta(gt=0, le=7)]
+    bearing_sd_rad: Annotated[float, msgspec.Meta(gt=0, le=MAX_BEARING_SD_RAD)]
     range_sd_m: Annotated[float, msgspec.Meta(gt=0, le=1e4)]
     width_m: Metres
     height_m: Metres

@@ -213,7 +213,7 @@ class ExtendedPam:
                     evidence=evidence,
                     bearing_rad=pose.bearing_rad,
                     range_m=pose.range_m,
-                    bearing_sd_rad=pose.bearing_sd_rad,
+                    bearing_sd_rad=pose.stated_bearing_sd_rad,
                     range_sd_m=pose.range_sd_m,
                     width_m=pose.width_m,
                     height_m=top_m,

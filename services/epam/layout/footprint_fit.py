@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cogmap.geometry.arrays import Floats
-from cogmap.schemas.sensing import Calibration
+from cogmap.schemas.sensing import MAX_BEARING_SD_RAD, Calibration
 from cogmap.services.epam.layout.footprint_model import (
     COLUMNS,
     MIN_RANGE_M,
@@ -85,6 +85,13 @@ class ObjectPose:
     range_sd_m: float
     misfit: float
     width_m: float
+
+    @property
+    def stated_bearing_sd_rad(self) -> float:
+        """Return the standard deviation of the bearing as a percept states it: what stands at the
+        camera, for all that is known, has no bearing.
+        """
+        return min(self.bearing_sd_rad, MAX_BEARING_SD_RAD)
 
     @property
     def sd_m(self) -> float:

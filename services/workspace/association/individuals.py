@@ -23,7 +23,7 @@ from cogmap.graph.likeness import is_new_side, likeness
 from cogmap.schemas import nodes
 from cogmap.schemas.array import Array
 from cogmap.schemas.nodes import Object, Self, individual_label
-from cogmap.schemas.sensing import Percept, Percepts
+from cogmap.schemas.sensing import MAX_BEARING_SD_RAD, Percept, Percepts
 from cogmap.services.workspace.association.beliefs import (
     BELIEVED,
     FARTHEST_M,
@@ -62,9 +62,6 @@ now and then."""
 
 P_IS_HERE = 20.0
 """The agent is where it believes if what it sees is so many times likelier there than elsewhere."""
-
-LARGEST_SD_RAD = 6.0
-"""A bearing that is less certain states nothing either."""
 
 MAX_CANDIDATES = 8
 """Objects that a percept is compared with at most: the nearest."""
@@ -321,7 +318,7 @@ def _one_of(
         label=likeliest.label,
         certainty=min(1.0, p_known),
         range_sd_m=math.sqrt(percept.range_sd_m**2 + along_m2),
-        bearing_sd_rad=min(math.sqrt(bearing_rad2), LARGEST_SD_RAD),
+        bearing_sd_rad=min(math.sqrt(bearing_rad2), MAX_BEARING_SD_RAD),
         appearance=None,
     )
 

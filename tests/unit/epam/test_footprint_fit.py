@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 
+import msgspec
 import numpy as np
 import pytest
 
+from cogmap.schemas.sensing import Percept
 from cogmap.services.epam.layout.footprint_fit import ObjectPose, Silhouette, locate
+from cogmap.testing import percept
 from tests.support.world.blocks import CAMERA, Block
 
 SIDES_M = (12.0, 8.0)
@@ -125,3 +128,14 @@ def test_a_pose_that_is_widened_errs_by_so_many_times_more_and_stays_where_it_is
     assert (wide.range_m, wide.bearing_rad) == (place.range_m, place.bearing_rad)
     assert wide.range_sd_m == pytest.approx(3 * place.range_sd_m)
     assert wide.bearing_sd_rad == pytest.approx(3 * place.bearing_sd_rad)
+
+
+def test_a_pose_at_the_camera_is_stated_as_a_percept_without_a_bearing() -> None:
+    pose = ObjectPose(
+        bearing_rad=0.0, range_m=0.5, bearing_sd_rad=9.0, range_sd_m=2.0, misfit=0.0, width_m=8.0
+    )
+    stated = percept("house", bearing_sd_rad=pose.stated_bearing_sd_rad)
+
+    received = msgspec.convert(msgspec.to_builtins(stated), Percept)
+    assert not received.has_bearing
+    assert pose.widened(0.1).stated_bearing_sd_rad == pytest.approx(0.9)
