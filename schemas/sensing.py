@@ -161,6 +161,11 @@ class Percept(Part, kw_only=True, frozen=True):
         """Return whether the range is known: its standard deviation is below the range."""
         return self.range_sd_m < self.range_m
 
+    @property
+    def has_place(self) -> bool:
+        """Return whether it states where something stands, by bearing and range."""
+        return self.has_bearing and self.has_range
+
 
 class PlaceMatch(Part, kw_only=True, frozen=True):
     """A view from a place that was seen before, recognised by the views that led to it.

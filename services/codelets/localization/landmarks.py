@@ -160,7 +160,7 @@ def is_well_placed(landmark: Object, percept: Percept) -> bool:
     """Decide whether a landmark's samples are a cloud, no ring or ray, and the percept would place
     it by itself.
     """
-    if not (percept.has_bearing and percept.has_range):
+    if not percept.has_place:
         return False
     return math.hypot(landmark.x_sd_m, landmark.y_sd_m) < MAX_SD_SHARE * percept.range_m
 
@@ -313,7 +313,7 @@ def refreshed(
 
 def sighting_of(percept: Percept, agent: Self) -> Sighting | None:
     """Return how something is seen now; None if its range or bearing is unknown."""
-    if not (percept.has_range and percept.has_bearing):
+    if not percept.has_place:
         return None
 
     path = agent.odometry

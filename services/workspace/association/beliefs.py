@@ -15,7 +15,7 @@ from cogmap.schemas.sensing import Percept
 FARTHEST_M = 50.0
 """The range up to which anything may be seen: no building is recognised from farther."""
 
-P_LOCAL = 0.5
+P_TRACKED = 0.5
 P_DRIFTED = 0.02
 """How likely the agent stands as surely to what it sees as to what it has seen of late, and how
 likely it has drifted as far as path integration has since the start."""
@@ -26,7 +26,6 @@ MAX_TURNED_RAD = 0.3
 
 MIN_VARIANCE = 1e-6
 """In square metres and radians: less than any pose is known to, so that matrices have inverses."""
-
 
 BELIEVED = 1
 """Which of the three ways in which a pose is believed is as its samples are."""
@@ -98,6 +97,6 @@ def belief_of(agent: Self, motions: Floats) -> Belief:
     return Belief(
         means=np.tile(mean, (3, 1)),
         covariances=np.stack([np.zeros((3, 3)), believed, drifted]) + step_noise,
-        log_weights=np.log([P_LOCAL, 1 - P_LOCAL - P_DRIFTED, P_DRIFTED]),
+        log_weights=np.log([P_TRACKED, 1 - P_TRACKED - P_DRIFTED, P_DRIFTED]),
         sources=np.array([Source.TRACKED, Source.MAPPED, Source.MAPPED]),
     )

@@ -26,7 +26,7 @@ def log_crowding(percept: Percept, nearest_m2: Floats) -> Floats:
     anywhere in view, (h,), if the nearest other thing stands at a squared distance, (h,). It is 0
     if nothing stands near, or its place is not known.
     """
-    if not is_located(percept):
+    if not percept.has_place:
         return np.zeros(len(nearest_m2))
 
     beside = FARTHEST_M * percept.range_m / (nearest_m2.clip(NEAREST_M**2) * LOG_SCALES)
@@ -38,7 +38,7 @@ def nearest_known_m2(belief: Belief, possible: Possible) -> Floats:
     (h,), from each of the belief's h distributions of the pose; at most FARTHEST_M squared.
     """
     percept = possible.percept
-    if not len(possible.numbers) or not is_located(percept):
+    if not len(possible.numbers) or not percept.has_place:
         return np.full(len(belief.means), FARTHEST_M**2)
 
     directions_rad = belief.means[:, 2] + percept.bearing_rad
@@ -59,7 +59,7 @@ def nearest_seen_m2(percept: Percept, others: Sequence[Percept]) -> float:
     """
     nearest_m2 = FARTHEST_M**2
     for other in others:
-        if not (is_located(percept) and is_located(other)):
+        if not (percept.has_place and other.has_place):
             continue
 
         apart_rad = percept.bearing_rad - other.bearing_rad
@@ -68,11 +68,6 @@ def nearest_seen_m2(percept: Percept, others: Sequence[Percept]) -> float:
         nearest_m2 = min(nearest_m2, apart_m2 + _variance_m2(percept) + _variance_m2(other))
 
     return nearest_m2
-
-
-def is_located(percept: Percept) -> bool:
-    """Decide whether a percept states where something stands, by range and bearing."""
-    return percept.has_range and percept.has_bearing
 
 
 def _variance_m2(percept: Percept) -> float:

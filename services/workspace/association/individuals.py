@@ -32,7 +32,6 @@ from cogmap.services.workspace.association.beliefs import (
     belief_of,
 )
 from cogmap.services.workspace.association.crowding import (
-    is_located,
     log_crowding,
     nearest_seen_m2,
 )
@@ -194,7 +193,7 @@ class Individuals:
             float(belief.covariances[:, 0, 0].max() + belief.covariances[:, 1, 1].max())
         )
         within_m = percept.range_m if percept.has_range else FARTHEST_M
-        if is_located(percept):
+        if percept.has_place:
             x_m, y_m = place_m(percept, belief)
             within_m = 0.0
 
@@ -207,7 +206,7 @@ class Individuals:
         """Decide whether a percept is of something that may stand where it is seen: two things do
         not stand in one place. If its place is not known, it may.
         """
-        if not is_located(percept):
+        if not percept.has_place:
             return True
 
         at_m = place_m(percept, belief)
@@ -280,7 +279,7 @@ def is_placed(percept: Percept) -> bool:
     """Decide whether something that was not met yet may enter the map where it is seen: it waits
     until it is nearer if its place says nothing of which of its neighbours it is.
     """
-    if not is_located(percept):
+    if not percept.has_place:
         return True
 
     across_sd_m = percept.range_m * percept.bearing_sd_rad

@@ -51,8 +51,8 @@ def tracked(nodes: Sequence[Object], on_map: Places, agent: Self, believed: Floa
 
     rows = np.array([row for row, _ in seen])
     last = _seen_last([sighting for _, sighting in seen], agent, pose)
-    traces_m2 = [np.trace(each, axis1=1, axis2=2) for each in (last.covariance_m2, covariance_m2)]
-    is_better = traces_m2[0] < traces_m2[1][rows]
+    last_m2 = np.trace(last.covariance_m2, axis1=1, axis2=2)
+    is_better = last_m2 < np.trace(covariance_m2[rows], axis1=1, axis2=2)
     mean_m[rows[is_better]] = last.mean_m[is_better]
     covariance_m2[rows[is_better]] = last.covariance_m2[is_better]
     return Places(mean_m, covariance_m2)
