@@ -157,7 +157,9 @@ def truth_part(
 
     if origin is not None:
         corners_m = [_corners_m(building) for building in town.buildings]
-        truth.buildings = [flat(se2.transform_to(origin, each)) for each in corners_m]
+        ends = np.cumsum([len(each) for each in corners_m])
+        on_map_m = se2.transform_to(origin, np.vstack([np.zeros((0, 2)), *corners_m]))
+        truth.buildings = [flat(each) for each in np.split(on_map_m, ends)[:-1]]
         truth.path = flat(se2.transform_to(origin, np.array(path_m).reshape(-1, 2)))
     return truth
 

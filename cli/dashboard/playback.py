@@ -7,6 +7,7 @@ import time
 from bisect import bisect_right
 from collections.abc import Iterator
 from dataclasses import dataclass
+from operator import attrgetter
 from pathlib import Path
 
 import lz4.frame
@@ -24,8 +25,13 @@ from cogmap.schemas import topics
 from cogmap.schemas.graph import Delta, Snapshot
 from cogmap.services.global_workspace.config import Config
 
-KEYFRAME_S = 5.0
-"""A moment is shown by the keyframe before it and what follows: some 100 ms of a town's log."""
+KEYFRAME_S = 1.0
+"""A moment is shown by the keyframe before it and what follows: some 100 messages of a town."""
+
+MAX_KEYFRAME_BYTES = 256 * 2**20
+"""What keyframes take at most: if they take more, they are spaced twice as far. That is every
+second of five minutes in a town of 600 m.
+"""
 
 VIEW_BACK_S = 2.0
 """The view of a moment is looked for so far back."""
@@ -59,6 +65,7 @@ class Playback:
         self._begin_ns, self._end_ns = self._reader.span_ns
         self._at_ns = self._begin_ns
         self._keyframes = [self._keyframe(self.scene, self._begin_ns)]
+        self._indexed_ns = self._begin_ns
         self._is_playing = False
         self._speed = 1.0
         self._seek_ns: int | None = self._begin_ns
@@ -85,7 +92,7 @@ class Playback:
         return Playing(
             at_s=self._seconds(self._at_ns),
             duration_s=self._seconds(self._end_ns),
-            indexed_s=self._seconds(self._keyframes[-1].at_ns),
+            indexed_s=self._seconds(self._indexed_ns),
             is_playing=self._is_playing,
             speed=self._speed,
             failure=self._failure,
@@ -141,21 +148,29 @@ class Playback:
         return Keyframe(at_ns, content, scene.received.copy())
 
     def _index(self) -> None:
-        """Go through the log once, and leave a keyframe every KEYFRAME_S."""
+        """Go through the log once, and leave keyframes."""
         reader = LogReader(self._reader.path)
         scene = self._new_scene()
-        due_ns = self._begin_ns + round(KEYFRAME_S * 1e9)
+        spacing_ns = round(KEYFRAME_S * 1e9)
+        n_bytes = 0
         try:
             for record in reader.records(_SMALL):
                 if self._has_ended:
                     return
-                if record.log_time_ns >= due_ns:
-                    self._keyframes.append(self._keyframe(scene, record.log_time_ns))
-                    due_ns = record.log_time_ns + round(KEYFRAME_S * 1e9)
+
+                if record.log_time_ns >= self._keyframes[-1].at_ns + spacing_ns:
+                    keyframe = self._keyframe(scene, record.log_time_ns)
+                    n_bytes += len(keyframe.graph)
+                    self._keyframes.append(keyframe)
+                    self._indexed_ns = record.log_time_ns
+                if n_bytes > MAX_KEYFRAME_BYTES:
+                    self._keyframes = self._keyframes[::2]
+                    n_bytes = sum(len(keyframe.graph) for keyframe in self._keyframes)
+                    spacing_ns *= 2
                 _take(scene, reader, record)
         except LogError as error:
             self._failure = str(error)
-        self._keyframes.append(self._keyframe(scene, self._end_ns + 1))
+        self._indexed_ns = self._end_ns
 
     def _play(self) -> None:
         """Show what is asked for, and go on while it plays."""
@@ -188,8 +203,9 @@ class Playback:
 
     def _show(self, at_ns: int) -> None:
         """Show the moment `at_ns`, by the keyframe before it."""
-        times_ns = [keyframe.at_ns for keyframe in self._keyframes]
-        keyframe = self._keyframes[max(0, bisect_right(times_ns, at_ns) - 1)]
+        keyframes = self._keyframes
+        later = bisect_right(keyframes, at_ns, key=attrgetter("at_ns"))
+        keyframe = keyframes[max(0, later - 1)]
         snapshot = decode(topics.SNAPSHOT, lz4.frame.decompress(keyframe.graph))
         assert isinstance(snapshot, Snapshot)
 

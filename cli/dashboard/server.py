@@ -25,10 +25,13 @@ PAGE = Path(__file__).parent / "page"
 PERIOD_S = 0.1
 """A browser is told what is new at most so often, and never before it has shown the last."""
 
-LOOK_S = 0.02
+LOOK_S = 0.01
+LONGEST_WAIT_S = 0.25
+"""A browser that asks waits so long at most."""
+
 MADE_ANEW_S = {
     PartName.MAP: 0.5,
-    PartName.MIND: 0.2,
+    PartName.MIND: 0.5,
     PartName.SYSTEM: 0.5,
     PartName.TOPICS: 0.5,
     PartName.TRUTH: 1.0,
@@ -130,15 +133,16 @@ class Dashboard:
         return socket
 
     async def _newer(self, asked: Asked) -> bytes:
-        """Wait until a part is newer than what a browser has, and return all those."""
+        """Wait until something is worth telling a browser, and return all parts that are newer than
+        what it has.
+        """
+        view = self._source.scene.versions[PartName.CAMERA]
         waited_s = 0.0
-        while True:
-            playing = self._source.playing
-            found = await asyncio.to_thread(self._parts, asked)
-            if found or waited_s >= 1.0:
-                break
+        while waited_s < LONGEST_WAIT_S and not self._is_worth_telling(asked, view):
             await asyncio.sleep(LOOK_S)
             waited_s += LOOK_S
+        playing = self._source.playing
+        found = await asyncio.to_thread(self._parts, asked)
 
         news = {
             "label": self._source.label,
@@ -148,6 +152,16 @@ class Dashboard:
             "message": self._message(asked.topic),
         }
         return msgspec.json.encode(news)
+
+    def _is_worth_telling(self, asked: Asked, view: int) -> bool:
+        """Decide whether there is a newer view than the version `view`, which an image of now
+        waits for; in a log that stands, whether there is anything new.
+        """
+        versions = self._source.scene.versions
+        playing = self._source.playing
+        if playing is None or playing.is_playing:
+            return versions[PartName.CAMERA] != view
+        return any(versions[name] != asked.have.get(name) for name in PartName)
 
     def _parts(self, asked: Asked) -> list[tuple[PartName, Made]]:
         """Make what is newer than what a browser has, and not made too short a time ago."""

@@ -6,28 +6,50 @@ import { showSystem, showTopics, showMessage } from "/page/system.js";
 import { byId, children, element } from "/page/dom.js";
 
 const RETRY_MS = 1000;
+// A page rests longer than it draws, so that a slow machine is left to what it shows.
+const RESTS = 9;
+const LONGEST_REST_MS = 400;
 const map = new MapView(byId("map"), byId("layers"), (x, y) => wish({ place: [x, y] }));
 const have = {};
 let playing = null;
 let isSliding = false;
 let isLive = false;
 let now = null;
+let ask = () => {};
 
 function connect() {
   const socket = new WebSocket(`ws://${location.host}/news`);
   socket.binaryType = "arraybuffer";
-  const ask = () => socket.send(JSON.stringify({ have, topic: byId("topic").value }));
-  socket.onopen = ask;
+  let rest = null;
+  ask = () => {
+    if (rest === null) return;
+    clearTimeout(rest);
+    rest = null;
+    socket.send(JSON.stringify({ have, topic: byId("topic").value }));
+  };
+  const askAfter = (ms) => { rest = setTimeout(() => ask(), ms); };
+  socket.onopen = () => askAfter(0);
   socket.onmessage = (event) => {
+    const began = performance.now();
     show(JSON.parse(new TextDecoder().decode(event.data)));
-    if (document.hidden) setTimeout(ask, RETRY_MS);
-    else requestAnimationFrame(ask);
+    const showing = performance.now() - began;
+    if (document.hidden) askAfter(RETRY_MS);
+    else drawn((drawing) => askAfter(Math.min(RESTS * (showing + drawing), LONGEST_REST_MS)));
   };
   socket.onclose = () => {
+    clearTimeout(rest);
     setStatus("the dashboard has ended", "bad");
     for (const name of Object.keys(have)) delete have[name];
     setTimeout(connect, RETRY_MS);
   };
+}
+
+// Calls `then` once the page has been drawn, with the milliseconds that this took.
+function drawn(then) {
+  requestAnimationFrame(() => {
+    const began = performance.now();
+    setTimeout(() => then(performance.now() - began));
+  });
 }
 
 function show(news) {
@@ -120,6 +142,7 @@ async function wish(wanted) {
     body: JSON.stringify(wanted),
   });
   say(await response.text(), response.ok);
+  ask();
 }
 
 function say(sentence, isDone) {

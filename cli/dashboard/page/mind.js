@@ -9,7 +9,7 @@ let competitions = [];
 
 export function showMind(mind) {
   competitions = mind.competitions;
-  drawTimeline();
+  requestAnimationFrame(drawTimeline);
   children(byId("needs"), mind.needs.map((each) =>
     bar(`need: ${each.name}`, each.level.toFixed(2), { share: each.level, note: each.is_eased ? "eased" : "" })));
   children(byId("schemes"), mind.schemes.slice(0, 8).map((each) =>

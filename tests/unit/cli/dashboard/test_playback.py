@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from cogmap.cli.dashboard import playback as playing
 from cogmap.cli.dashboard.playback import Playback
 from cogmap.cli.dashboard.source import Wish
 from cogmap.errors import LogError, UsageError
@@ -50,6 +51,19 @@ def test_a_moment_has_the_graph_and_the_view_of_that_time(playback: Playback, sh
     view = playback.scene.received.message(topics.VIEW)
     assert isinstance(view, View)
     assert view.frame == views[-1].frame
+
+
+def test_a_moment_is_the_same_where_little_memory_is_left(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(playing, "MAX_KEYFRAME_BYTES", 100_000)
+    source = Playback(REFERENCE)
+    wait_until(lambda: source.playing.indexed_s >= source.playing.duration_s, "all is read")
+    log = open_log(REFERENCE)
+    at_s = math.floor(1e3 * log.duration_s) / 1e3
+    show(source, at_s)
+    source.close()
+
+    assert sum(len(keyframe.graph) for keyframe in source._keyframes) <= 100_000
+    assert source.scene.graph.digest() == log.graph_at(at_s).digest()
 
 
 def test_it_plays_to_the_end_and_stands_there(playback: Playback) -> None:
