@@ -11,6 +11,23 @@ class Clock(Message, kw_only=True, frozen=True):
     rate: Finite = 1.0
 
 
+class Pause(Message, kw_only=True, frozen=True):
+    """Asks that the time of the simulation, or of the recording, stands after `views` more views;
+    that it passes if `is_paused` is false.
+    """
+
+    is_paused: bool
+    views: Count = 0
+
+
+class Paused(Message, kw_only=True, frozen=True):
+    """Whether time stands at the stamp, because somebody asked for it; said as that changes, and
+    each second while it stands.
+    """
+
+    is_paused: bool
+
+
 class Playback(Message, kw_only=True, frozen=True):
     """How much of a recording has been played until the stamp; `progress` is 1 once it is over.
     Observers only.

@@ -99,6 +99,8 @@ ACTION = Topic("action/selected", cognition.Action, 0, _NEVER)
 MOTOR_PROGRAM = Topic("motor/program", cognition.MotorProgram, 0, _NEVER)
 MOTOR_COMMAND = Topic("motor/command", sensing.MotorCommand, 5, _NEVER)
 STREET_CLOSURE = Topic("sim/street", sensing.StreetClosure, 0, _NEVER)
+PAUSE = Topic("sim/pause", process.Pause, 0, _NEVER, Scope.PROCESS)
+PAUSED = Topic("sim/paused", process.Paused, 0, _NEVER, Scope.PROCESS)
 TRUE_POSE = Topic("truth/pose", sensing.TruePose, 20, _LATEST, Scope.TRUTH, sensed=True)
 TRUE_TOWN = Topic(
     "truth/town",

@@ -28,6 +28,7 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.graph import DropNode, SnapshotRequest
 from cogmap.schemas.nodes import Goal, Object, goal_id
+from cogmap.schemas.process import Pause
 from cogmap.schemas.sensing import StreetClosure
 from cogmap.schemas.topics import Topic
 from cogmap.services.global_workspace.config import Config
@@ -35,7 +36,7 @@ from cogmap.services.global_workspace.config import Config
 DASHBOARD = "dashboard"
 IDLE_S = 0.1
 RETRY_S = 1.0
-PUBLISHED = (topics.OFFER, topics.STREET_CLOSURE)
+PUBLISHED = (topics.OFFER, topics.STREET_CLOSURE, topics.PAUSE)
 
 
 class Live:
@@ -176,6 +177,12 @@ def message_for(wish: Wish, graph: Graph) -> tuple[Message, str]:
         closure = StreetClosure(street=wish.street, closed=wish.closed)
         return closure, f"{wish.street} is to be {done}"
 
+    if wish.step:
+        return Pause(is_paused=True, views=1), "one view on"
+    if wish.play is not None:
+        done = "time is to pass" if wish.play else "time is to stand"
+        return Pause(is_paused=not wish.play), done
+
     if wish.clear:
         goals = [DropNode(id=goal.id) for goal in graph.of_kind(Goal)]
         return Offer(cycle=graph.cycle, operations=[*goals]), "every goal is forgotten"
@@ -190,6 +197,6 @@ def message_for(wish: Wish, graph: Graph) -> tuple[Message, str]:
         x_m, y_m = wish.place
         goal = Goal(id=goal_id(f"{x_m:g},{y_m:g}"), base_level=1.0, x_m=x_m, y_m=y_m)
     else:
-        raise UsageError("a running system takes goals and streets: give one")
+        raise UsageError("a running system has no other time than now: give a goal or a street")
     name = goal.id.removeprefix(goal_id(""))
     return Offer(cycle=graph.cycle, operations=[goal]), f"{name} is a goal now"

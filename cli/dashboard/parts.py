@@ -42,6 +42,7 @@ class Now(Part, kw_only=True):
     speed_m_s: float = 0.0
     halted_by: str = ""
     slowed_by: str = ""
+    is_paused: bool = False
     energy: float | None = None
     is_charging: bool = False
     conscious: str = ""

@@ -21,7 +21,7 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Action, Broadcast, Competition
 from cogmap.schemas.graph import Delta
 from cogmap.schemas.nodes import PLAN_ID, Plan
-from cogmap.schemas.process import Health
+from cogmap.schemas.process import Health, Paused
 from cogmap.schemas.sensing import (
     Energy,
     MotorCommand,
@@ -51,6 +51,7 @@ _CHANGED_BY: dict[type[Message], tuple[PartName, ...]] = {
     Broadcast: (PartName.MIND, PartName.NOW),
     Action: (PartName.MIND, PartName.NOW),
     Health: (PartName.SYSTEM,),
+    Paused: (PartName.NOW,),
     TrueTown: (PartName.TRUTH,),
     TruePose: (PartName.TRUTH,),
 }
@@ -130,6 +131,9 @@ class Scene:
         if isinstance(command, MotorCommand):
             now.halted_by = command.halted_by.value
             now.slowed_by = command.slowed_by.value
+        paused = received.message(topics.PAUSED)
+        if isinstance(paused, Paused):
+            now.is_paused = paused.is_paused
         energy = received.message(topics.ENERGY)
         if isinstance(energy, Energy):
             now.energy = energy.level

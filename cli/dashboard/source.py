@@ -59,8 +59,8 @@ class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """What a person wants done; one of its fields is given.
 
     `goal` is an object's name or label, `place` x and y on the map, to go to; `clear` forgets all
-    goals. `street` is to be `closed` or opened. Of a log: `seek_s` is a time to show, `play`
-    whether it is to go on, `step` asks for the next cycle, `speed` is how fast it plays.
+    goals. `street` is to be `closed` or opened. `play` is whether time is to pass, `step` asks for
+    the next cycle alone. Of a log: `seek_s` is a time to show, `speed` is how fast it plays.
     """
 
     goal: Name | None = None

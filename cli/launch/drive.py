@@ -53,7 +53,8 @@ class Drive:
     router `endpoint`. Where there is a `server`, it forks them.
 
     It may take `limit_s` of wall-clock time from `began_s` on or, unless `limits_start`, from its
-    first pose on: then a slow start takes nothing from the drive.
+    first pose on: then a slow start takes nothing from the drive. While somebody lets time stand,
+    nothing is counted.
     """
 
     folder: Path
@@ -71,6 +72,7 @@ class Drive:
         self.supervisor = Supervisor(self.folder, self.server)
         self._watchdog = Watchdog()
         self._serves_dashboard = False
+        self._paused_s = 0.0
         self.guide: Guide | None = None
         if self.choices.tour:
             self.guide = Guide(EXPLORE_S, self.choices.goals)
@@ -106,6 +108,7 @@ class Drive:
         counted_from_s = self.began_s
         if not self.limits_start:
             counted_from_s += self.start_s.get(FIRST_POSE, 0.0)
+        counted_from_s += self._paused_s
         return time.monotonic() >= counted_from_s + self.limit_s - FINISH_S
 
     def _drive(self, watch: Watch, stop: Stop, display: Display) -> Ending:
@@ -146,7 +149,10 @@ class Drive:
         shown: Stage | None = None
         missing = watch.missing(self.participants)
         while (ending := self._ending(watch, missing, stop)) is None:
+            pumped_s = time.monotonic()
             watch.pump(PUMP_S)
+            if tally.is_paused:
+                self._paused_s += time.monotonic() - pumped_s
             if self.guide is not None:
                 for message in self.guide.step(observer, tally.replica.graph):
                     watch.publish(message)
@@ -215,6 +221,7 @@ class Drive:
             is_charging=tally.energy.is_charging,
             is_out=tally.energy.is_out,
             is_recorded=bool(self.choices.recording),
+            is_paused=tally.is_paused,
         )
         return self._watchdog.check(situation)
 

@@ -22,7 +22,7 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Broadcast
 from cogmap.schemas.graph import Delta, DropNode
 from cogmap.schemas.nodes import Object
-from cogmap.schemas.process import Health
+from cogmap.schemas.process import Health, Paused
 from cogmap.schemas.sensing import Energy, MotorCommand, SpeedLimit
 from cogmap.schemas.topics import Delivery
 
@@ -34,6 +34,7 @@ FOLLOWED = (
     topics.MOTOR_COMMAND,
     topics.BROADCAST,
     topics.HEALTH,
+    topics.PAUSED,
 )
 
 
@@ -98,7 +99,8 @@ class Tally:
     answers of codelets were dropped. `forgotten`: the labels of objects that left the map as their
     activation had decayed. `percepts` has them all, and what each was given to. `halted` and
     `slowed`: how many commands stopped the robot or kept it below its cruising speed, by reason;
-    `command` is the newest. `energy` is what the body sensed of it.
+    `command` is the newest. `energy` is what the body sensed of it. `is_paused` is whether somebody
+    lets time stand.
     """
 
     def __init__(self, replica: Replica) -> None:
@@ -115,6 +117,7 @@ class Tally:
         self.slowed: Counter[str] = Counter()
         self.command: MotorCommand | None = None
         self.energy = EnergyTally()
+        self.is_paused = False
         self.health: dict[str, Health] = {}
         self._busy: dict[str, list[float]] = {}
 
@@ -149,6 +152,8 @@ class Tally:
                 self.broadcasts += 1
             case Energy():
                 self.energy.update(message)
+            case Paused():
+                self.is_paused = message.is_paused
             case MotorCommand():
                 self._on_command(message, envelope, received_ns)
 

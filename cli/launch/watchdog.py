@@ -24,7 +24,7 @@ class Situation:
     `missing` are the modules that are not ready, `halted_by` is the reason of the newest of so many
     `commands`, NONE where it moves the wheels. `is_charging` is whether its battery is charged now,
     `is_out` whether that is empty. `is_recorded` is whether a recording is played, in which nothing
-    moves the robot.
+    moves the robot; `is_paused` whether somebody lets time stand.
     """
 
     now_s: float
@@ -36,6 +36,7 @@ class Situation:
     is_charging: bool = False
     is_out: bool = False
     is_recorded: bool = False
+    is_paused: bool = False
 
 
 class Watchdog:
@@ -63,7 +64,7 @@ class Watchdog:
             self._moved = situation
             return None
 
-        if situation.drive_s > ticked.drive_s:
+        if situation.drive_s > ticked.drive_s or situation.is_paused:
             self._ticked = situation
         elif situation.now_s - ticked.now_s >= STALLED_S:
             return Ending(Outcome.STALLED, _stalled(situation))

@@ -8,7 +8,7 @@ import click
 import msgspec
 
 from cogmap.bus.codec import Envelope, decode, encode
-from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.bus.interface import Bus
 from cogmap.cli.options import FiniteRange
 from cogmap.cli.topic.argument import streamed_argument
 from cogmap.cli.topic.observing import CLI, RouterWatch, observing
@@ -65,7 +65,7 @@ def pub(
 class Publisher:
     """Publishes one message again and again, each time with the next number."""
 
-    def __init__(self, bus: ZenohBus, topic: Topic, message: Message) -> None:
+    def __init__(self, bus: Bus, topic: Topic, message: Message) -> None:
         self.number = 0
         self._bus = bus
         self._topic = topic

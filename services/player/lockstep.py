@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from cogmap.runtime.pausing import Pausing
 from cogmap.schemas.base import Message
-from cogmap.schemas.process import Clock
+from cogmap.schemas.process import Clock, Pause
 from cogmap.schemas.sensing import MotorCommand
 from cogmap.services.player.playhead import Playhead
 
@@ -18,12 +19,15 @@ no cycle of a loaded machine takes as long, and a module that was restarted is b
 
 class Lockstep:
     """Plays the next view for each command that answers the last one, until the recording is over.
+    While time stands, the next view waits though the last one is answered.
 
     What a command says moves nothing.
     """
 
     def __init__(self, playhead: Playhead) -> None:
         self._playhead = playhead
+        self._pausing = Pausing()
+        self._is_answered = False
         self._view_ns: int | None = None
         self._sensed: list[Message] = []
         self._timed_view_ns: int | None = None
@@ -39,7 +43,16 @@ class Lockstep:
         """
         if command.stamp_ns != self._view_ns or self._playhead.is_over:
             return None
-        return self._advance()
+        if self._is_answered:
+            return None
+
+        self._is_answered = True
+        return self._next()
+
+    def on_pause(self, pause: Pause) -> list[Message]:
+        """Return whether time stands now, and the next view, or the end, if it waited."""
+        self._pausing.on_pause(pause)
+        return [self._pausing.said(self._view_ns or 0), *self._next()]
 
     def on_timer(self, wall_ns: int) -> list[Message]:
         """Return what was sensed last once more if no command has answered it for REPEAT_AFTER_NS
@@ -47,6 +60,8 @@ class Lockstep:
         """
         if self._view_ns is None or self._playhead.is_over:
             return []
+        if self._is_answered:
+            return list(self._pausing.said_again(self._view_ns, wall_ns))
 
         if self._timed_view_ns != self._view_ns:
             self._timed_view_ns = self._view_ns
@@ -58,6 +73,12 @@ class Lockstep:
         self._waiting_since_ns = wall_ns
         return self._sensed
 
+    def _next(self) -> list[Message]:
+        """Return what comes next, if the last view is answered and time does not stand."""
+        if not self._is_answered or self._playhead.is_over or not self._pausing.takes_step():
+            return []
+        return self._advance()
+
     def _advance(self) -> list[Message]:
         """Return what is sensed up to the next view, or, where there is none, the end."""
         step = self._playhead.advance()
@@ -65,6 +86,7 @@ class Lockstep:
             return [self._playhead.end()]
 
         self._view_ns = step.stamp_ns
+        self._is_answered = False
         self._sensed = [*step.before, *step.view]
         clock = Clock(stamp_ns=step.stamp_ns, rate=0.0)
         return [*step.before, clock, *step.truth, *step.view]

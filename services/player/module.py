@@ -8,7 +8,7 @@ from cogmap.errors import ConfigError
 from cogmap.runtime.module import Module
 from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
-from cogmap.schemas.sensing import MotorCommand
+from cogmap.schemas.base import Message
 from cogmap.services.player import formats
 from cogmap.services.player.config import Config
 from cogmap.services.player.lockstep import REPEAT_CHECK_NS, Lockstep
@@ -20,6 +20,7 @@ __all__ = ["Config", "build"]
 NAME = "player"
 _EMITS = (
     topics.CLOCK,
+    topics.PAUSED,
     topics.STEREO,
     topics.ODOMETRY,
     topics.SELF_MOTION,
@@ -38,6 +39,7 @@ def build(config: Config, instance: str = NAME, run: Run = REAL_TIME) -> Module:
     """
     module = Module(NAME, instance)
     if not config.recording and not run.has_any(NAME):
+        module.on(topics.PAUSE, _ignore)
         return module.on(topics.MOTOR_COMMAND, _ignore, _EMITS)
     if not config.recording:
         raise ConfigError("[player] recording is empty: name what is to be played, as FORMAT:PATH")
@@ -51,14 +53,16 @@ def build(config: Config, instance: str = NAME, run: Run = REAL_TIME) -> Module:
     if run.lockstep:
         lockstep = Lockstep(playhead)
         module.on(topics.MOTOR_COMMAND, lockstep.on_command, _EMITS)
+        module.on(topics.PAUSE, lockstep.on_pause, _EMITS)
         module.on_start(lockstep.on_start, required, _EMITS)
         return module.every(REPEAT_CHECK_NS, lockstep.on_timer, _EMITS)
 
     real_time = RealTime(playhead, config.speed)
     module.on(topics.MOTOR_COMMAND, real_time.on_command, _EMITS)
+    module.on(topics.PAUSE, real_time.on_pause, [topics.PAUSED])
     module.on_start(real_time.on_start, required)
     return module.every(PERIOD_NS, real_time.on_timer, _EMITS)
 
 
-def _ignore(command: MotorCommand) -> None:
+def _ignore(_message: Message) -> None:
     """Do nothing: the simulation obeys it."""

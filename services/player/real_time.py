@@ -6,8 +6,9 @@ from collections import deque
 
 from msgspec.structs import replace
 
+from cogmap.runtime.pausing import Pausing
 from cogmap.schemas.base import Message
-from cogmap.schemas.process import Clock, Playback
+from cogmap.schemas.process import Clock, Pause, Playback
 from cogmap.schemas.sensing import MotorCommand
 from cogmap.services.player.playhead import Playhead
 
@@ -33,6 +34,7 @@ class RealTime:
     def __init__(self, playhead: Playhead, speed: float) -> None:
         self._playhead = playhead
         self._speed = speed
+        self._pausing = Pausing()
         self._is_started = False
         self._wall_ns: int | None = None
         self._now_ns = 0
@@ -51,9 +53,15 @@ class RealTime:
         """Note that a view was answered."""
         self._answered_ns = max(self._answered_ns, command.stamp_ns)
 
+    def on_pause(self, pause: Pause) -> list[Message]:
+        """Return whether time stands now."""
+        self._pausing.on_pause(pause)
+        return [self._pausing.said(self._now_ns)]
+
     def on_timer(self, wall_ns: int) -> list[Message]:
         """Return all that is due at `wall_ns`, which is monotonic, and the end, once the last view
-        is answered or has been waiting for LAST_ANSWER_NS.
+        is answered or has been waiting for LAST_ANSWER_NS. While time stands, that is nothing, or
+        what is due up to the next view if that is to come.
         """
         if not self._is_started or self._playhead.is_over:
             return []
@@ -61,10 +69,15 @@ class RealTime:
         passed_ns = 0
         if self._wall_ns is None:
             self._now_ns = self._playhead.begins_ns
-        else:
+        elif not self._pausing.is_paused:
             passed_ns = min(wall_ns - self._wall_ns, CATCH_UP_NS)
         self._wall_ns = wall_ns
         self._now_ns += round(passed_ns * self._speed)
+        if self._pausing.is_paused:
+            if not self._pausing.takes_step():
+                return list(self._pausing.said_again(self._now_ns, wall_ns))
+            if self._due or self._has_read_more():
+                self._now_ns = max(self._now_ns, self._view_ns)
 
         messages: list[Message] = [Clock(stamp_ns=self._now_ns, rate=self._speed)]
         messages += self._told(wall_ns)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from cogmap.runtime.pausing import Pausing
 from cogmap.schemas.base import Message
+from cogmap.schemas.process import Pause
 from cogmap.schemas.sensing import MotorCommand
 from cogmap.services.sim.simulation import Simulation
 
@@ -17,11 +19,13 @@ machine takes as long, and a module that was restarted is back within it.
 
 class Lockstep:
     """Advances `simulation` by one frame for each command that answers the last one, until the
-    drive is over.
+    drive is over. While time stands, the next frame waits though the last one is answered.
     """
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
+        self._pausing = Pausing()
+        self._is_answered = False
         self._frame_ns: int | None = None
         self._senses: list[Message] = []
         self._timed_frame_ns: int | None = None
@@ -37,10 +41,17 @@ class Lockstep:
         """
         if command.stamp_ns != self._frame_ns or self._simulation.progress >= 1.0:
             return None
+        if self._is_answered:
+            return None
 
         self._simulation.drive(command)
+        self._is_answered = True
+        return self._next()
 
-        return self._advance()
+    def on_pause(self, pause: Pause) -> list[Message]:
+        """Return whether time stands now, and the next frame if it waited."""
+        self._pausing.on_pause(pause)
+        return [self._pausing.said(self._simulation.now_ns), *self._next()]
 
     def on_timer(self, wall_ns: int) -> list[Message]:
         """Return the last frame and its odometry once more if no command has answered it for
@@ -48,6 +59,8 @@ class Lockstep:
         """
         if self._frame_ns is None or self._simulation.progress >= 1.0:
             return []
+        if self._is_answered:
+            return list(self._pausing.said_again(self._simulation.now_ns, wall_ns))
 
         if self._timed_frame_ns != self._frame_ns:
             self._timed_frame_ns = self._frame_ns
@@ -59,6 +72,12 @@ class Lockstep:
         self._waiting_since_ns = wall_ns
 
         return self._senses
+
+    def _next(self) -> list[Message]:
+        """Return the next frame, if the last one is answered and time does not stand."""
+        if not self._is_answered or not self._pausing.takes_step():
+            return []
+        return self._advance()
 
     def _advance(self) -> list[Message]:
         simulation = self._simulation
@@ -72,6 +91,7 @@ class Lockstep:
         view = simulation.view()
 
         self._frame_ns = simulation.now_ns
+        self._is_answered = False
         self._senses = [*odometry, *view]
 
         return [*odometry, clock, truth, *town, *view]

@@ -21,7 +21,7 @@ from cogmap.services.sim.trajectory import Trajectory
 
 __all__ = ["Config", "build"]
 
-_ALWAYS = (topics.CLOCK, topics.TRUE_POSE, topics.TRUE_TOWN, topics.ENERGY)
+_ALWAYS = (topics.CLOCK, topics.PAUSED, topics.TRUE_POSE, topics.TRUE_TOWN, topics.ENERGY)
 _CAMERA_LEVEL = (*_ALWAYS, topics.ODOMETRY, topics.STEREO)
 _PERCEPT_LEVEL = (*_ALWAYS, topics.SELF_MOTION, topics.SCAN, topics.PERCEPTS)
 
@@ -62,11 +62,13 @@ def build(config: Config, instance: str = "sim", run: Run = REAL_TIME) -> Module
     if run.lockstep:
         lockstep = Lockstep(simulation)
         module.on(topics.MOTOR_COMMAND, lockstep.on_command, emits)
+        module.on(topics.PAUSE, lockstep.on_pause, emits)
         module.on_start(lockstep.on_start, required, emits)
         return module.every(REPEAT_CHECK_NS, lockstep.on_timer, emits)
 
     real_time = RealTime(simulation)
     module.on(topics.MOTOR_COMMAND, real_time.on_command)
+    module.on(topics.PAUSE, real_time.on_pause, [topics.PAUSED])
     module.on_start(real_time.on_start, required)
     return module.every(simulation.tick_ns, real_time.on_timer, emits)
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections import deque
 
 from cogmap.errors import MessageError
+from cogmap.runtime.pausing import Pausing
 from cogmap.schemas.base import Message
+from cogmap.schemas.process import Pause
 from cogmap.schemas.sensing import MotorCommand
 from cogmap.services.sim.simulation import Simulation
 
@@ -34,6 +36,7 @@ class RealTime:
 
     def __init__(self, simulation: Simulation) -> None:
         self._simulation = simulation
+        self._pausing = Pausing()
         self._is_started = False
         self._behind_ns = 0
         self._wall_ns: int | None = None
@@ -64,8 +67,14 @@ class RealTime:
         self._arrived_ns = now_ns
         self._simulation.drive(command)
 
+    def on_pause(self, pause: Pause) -> list[Message]:
+        """Return whether time stands now."""
+        self._pausing.on_pause(pause)
+        return [self._pausing.said(self._simulation.now_ns)]
+
     def on_timer(self, wall_ns: int) -> list[Message]:
-        """Return all that happens until `wall_ns`, which is monotonic.
+        """Return all that happens until `wall_ns`, which is monotonic. While time stands, that is
+        nothing, or what happens up to the next frame if that is to come.
 
         The first call adds the time up to the first frame: the robot stands until then, as nobody
         can command it without a view.
@@ -76,13 +85,17 @@ class RealTime:
         simulation = self._simulation
         tick_ns = simulation.tick_ns
         period_ns = simulation.ticks_per_frame * tick_ns
-        passed_ns = period_ns - simulation.now_ns % period_ns
-        if self._wall_ns is not None:
-            passed_ns = wall_ns - self._wall_ns
-        self._wall_ns = wall_ns
-        self._behind_ns = min(self._behind_ns + passed_ns, CATCH_UP_NS)
-
+        to_frame_ns = period_ns - simulation.now_ns % period_ns
         messages: list[Message] = []
+        if self._pausing.is_paused:
+            self._behind_ns = to_frame_ns if self._pausing.takes_step() else 0
+            messages += self._pausing.said_again(simulation.now_ns, wall_ns)
+        else:
+            passed_ns = to_frame_ns if self._wall_ns is None else wall_ns - self._wall_ns
+            self._behind_ns = min(self._behind_ns + passed_ns, CATCH_UP_NS)
+        self._wall_ns = wall_ns
+
+        has_moved = self._behind_ns >= tick_ns
         is_frame_due = False
         while self._behind_ns >= tick_ns:
             now_ns = simulation.now_ns
@@ -97,7 +110,7 @@ class RealTime:
             self._behind_ns -= tick_ns
             is_frame_due |= simulation.now_ns % period_ns == 0
 
-        if messages:
+        if has_moved:
             rate = self._rate(wall_ns)
             messages += [simulation.clock(rate), simulation.truth()]
             messages += simulation.changed_town()

@@ -81,6 +81,8 @@ const panels = {
 function showNow(content) {
   now = content;
   map.setNow(now);
+  byId("pause").textContent = now.is_paused ? "Go on" : "Pause";
+  byId("pause").setAttribute("aria-pressed", now.is_paused);
   const facts = [["time", `${now.at_s.toFixed(1)} s`], ["cycle", now.cycle]];
   if (now.pose) {
     const [x, y, heading] = now.pose;
@@ -101,6 +103,7 @@ function showNow(content) {
 function showStatus(isThere) {
   if (!isThere) setStatus("no system runs here", "bad");
   else if (!now || !now.cycle) setStatus("no agent yet", "");
+  else if (now.is_paused) setStatus("paused", "");
   else if (now.halted_by) setStatus(`stands: ${now.halted_by}`, now.halted_by === "at goal" ? "good" : "bad");
   else if (now.slowed_by) setStatus(`slowed: ${now.slowed_by}`, "");
   else setStatus("drives", "good");
@@ -158,6 +161,8 @@ byId("person").addEventListener("submit", (event) => {
   if (!text) return;
   wish(place.length === 2 && place.every(Number.isFinite) ? { place } : { goal: text });
 });
+byId("pause").onclick = () => wish({ play: now !== null && now.is_paused });
+byId("next").onclick = () => wish({ step: true });
 byId("clear").onclick = () => wish({ clear: true });
 byId("close").onclick = () => wish({ street: byId("street").value, closed: true });
 byId("open").onclick = () => wish({ street: byId("street").value, closed: false });

@@ -11,7 +11,7 @@ from cogmap.errors import ConfigError, UsageError
 from cogmap.runtime.module import Module
 from cogmap.runtime.run import LOCKSTEP, REAL_TIME, Run
 from cogmap.schemas.base import Message
-from cogmap.schemas.process import Clock, Playback
+from cogmap.schemas.process import Clock, Pause, Paused, Playback
 from cogmap.schemas.sensing import MotorCommand, Percepts, StereoFrame, TrueTown
 from cogmap.services.player.lockstep import REPEAT_AFTER_NS, REPEAT_CHECK_NS, Lockstep
 from cogmap.services.player.module import Config, build
@@ -103,10 +103,12 @@ def test_an_end_without_any_view_that_can_be_read_is_an_end() -> None:
     assert (end.progress, end.views, end.skipped) == (1.0, 0, 2)
 
 
-def _in_real_time(real_time: RealTime, seconds: float, answers: bool = True) -> list[Message]:
+def _in_real_time(
+    real_time: RealTime, seconds: float, answers: bool = True, since_ns: int = START_NS
+) -> list[Message]:
     messages: list[Message] = []
     for tick in range(round(seconds * 1e9 / PERIOD_NS)):
-        new = real_time.on_timer(START_NS + tick * PERIOD_NS)
+        new = real_time.on_timer(since_ns + tick * PERIOD_NS)
         messages += new
         for view in of_type(Percepts, new):
             if answers:
@@ -133,6 +135,37 @@ def test_in_real_time_nothing_is_played_before_the_others_are_ready() -> None:
     real_time = RealTime(Playhead(Walk(2), "test:walk"), 1.0)
 
     assert _in_real_time(real_time, 1.0) == []
+
+
+def test_in_real_time_nothing_is_played_while_time_stands_but_step_by_step() -> None:
+    real_time = RealTime(Playhead(Walk(5), "test:walk"), 1.0)
+    real_time.on_start()
+    before = _in_real_time(real_time, 0.1)
+    real_time.on_pause(Pause(is_paused=True))
+    stands = _in_real_time(real_time, 3.0, since_ns=START_NS + 1 * 3 * 10**9)
+    real_time.on_pause(Pause(is_paused=True, views=2))
+    steps = _in_real_time(real_time, 3.0, since_ns=START_NS + 2 * 3 * 10**9)
+    real_time.on_pause(Pause(is_paused=False))
+    after = _in_real_time(real_time, 3.0, since_ns=START_NS + 3 * 3 * 10**9)
+
+    assert {type(message) for message in stands} == {Paused}
+    assert [view.frame for view in of_type(Percepts, before)] == [0]
+    assert [view.frame for view in of_type(Percepts, steps)] == [1, 2]
+    assert [view.frame for view in of_type(Percepts, after)] == [3, 4]
+    assert after[-1] == of_type(Playback, after)[-1]
+
+
+def test_in_lockstep_the_next_view_waits_while_time_stands() -> None:
+    lockstep = Lockstep(Playhead(Walk(2), "test:walk"))
+    lockstep.on_start()
+    lockstep.on_pause(Pause(is_paused=True))
+
+    assert lockstep.on_command(_command(stamp_ns(0))) == []
+    stepped = lockstep.on_pause(Pause(is_paused=True, views=1))
+    assert [view.frame for view in of_type(Percepts, stepped)] == [1]
+    assert lockstep.on_command(_command(stamp_ns(1))) == []
+    (end,) = of_type(Playback, lockstep.on_pause(Pause(is_paused=False)))
+    assert end.progress == 1.0
 
 
 def test_in_real_time_it_is_over_when_the_last_view_is_answered() -> None:

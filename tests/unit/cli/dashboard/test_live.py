@@ -11,6 +11,7 @@ from cogmap.errors import UsageError
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.graph import DropNode
 from cogmap.schemas.nodes import Goal
+from cogmap.schemas.process import Pause
 from cogmap.schemas.sensing import StreetClosure
 from cogmap.testing import graph_of, landmark
 
@@ -55,9 +56,22 @@ def test_a_street_is_closed_and_opened() -> None:
         assert closure == StreetClosure(street="Elm Street 1", closed=closed)
 
 
-@pytest.mark.parametrize("wish", [Wish(), Wish(play=True), Wish(seek_s=3.0)])
-def test_a_running_system_cannot_be_played(wish: Wish) -> None:
-    with pytest.raises(UsageError, match="goals and streets"):
+@pytest.mark.parametrize(
+    ("wish", "pause"),
+    [
+        (Wish(play=False), Pause(is_paused=True)),
+        (Wish(play=True), Pause(is_paused=False)),
+        (Wish(step=True), Pause(is_paused=True, views=1)),
+    ],
+)
+def test_time_stands_passes_and_goes_on_by_a_view(wish: Wish, pause: Pause) -> None:
+    asked, _ = message_for(wish, GRAPH)
+    assert asked == pause
+
+
+@pytest.mark.parametrize("wish", [Wish(), Wish(speed=2.0), Wish(seek_s=3.0)])
+def test_a_running_system_has_no_other_time(wish: Wish) -> None:
+    with pytest.raises(UsageError, match="no other time than now"):
         message_for(wish, GRAPH)
 
 

@@ -118,3 +118,7 @@ def test_only_a_drive_to_its_end_exits_with_0() -> None:
     assert codes.pop(Outcome.RECORDING_OVER) == 0
     assert codes.pop(Outcome.INTERRUPTED) == 130
     assert set(codes.values()) == {1}
+
+
+def test_a_drive_whose_time_somebody_lets_stand_is_left_alone() -> None:
+    assert after(2 * STALLED_S, 0.0, is_paused=True) is None
