@@ -14,12 +14,13 @@ from cogmap.cli.launch.display import Display, display_on
 from cogmap.cli.launch.drive import Drive
 from cogmap.cli.launch.drive_metrics import RunMetrics
 from cogmap.cli.launch.forking.client import fork_server
-from cogmap.cli.launch.observer import Errors, Observer
+from cogmap.cli.launch.observer import Observer
 from cogmap.cli.launch.outcome import Outcome
 from cogmap.cli.launch.plan import Choices, effective
 from cogmap.cli.launch.watch import Watch
 from cogmap.cli.run import summary
 from cogmap.errors import CogmapError
+from cogmap.evaluation.paths import Errors
 from cogmap.recording.recorder import Summary
 from cogmap.recording.storage.format import LOG_NAME, SUMMARY
 from cogmap.recording.storage.reader import LogReader

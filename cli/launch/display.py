@@ -8,7 +8,8 @@ from typing import Protocol
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn
 
-from cogmap.cli.launch.observer import Errors, Observer
+from cogmap.cli.launch.observer import Observer
+from cogmap.evaluation.paths import Errors
 
 PLAIN_PERIOD_S = 5.0
 

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 from cogmap.bus.codec import Envelope, decode
 from cogmap.errors import LogError, MessageError
+from cogmap.evaluation.paths import FOLLOWED
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
-from cogmap.recording import selection, table
+from cogmap.recording import path_errors, selection, table
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.format import MAX_TIME_NS
 from cogmap.recording.storage.reader import LogReader, Record
@@ -149,6 +150,22 @@ class Log:
         rows = rows_of(graph.path)
         return arrow.table({column.name.lower(): rows[:, column] for column in PathColumn})
 
+    def errors(self) -> pyarrow.Table:
+        """Return how far the agent was from where it believed to be: a row a moment of which there
+        is an estimate and the truth.
+
+        `time_s` is when the estimate was received first, `stamp_ns` of when it is; `x_m`, `y_m` and
+        `heading_rad` are the true pose. The errors of position, in metres, and of heading, in
+        radians, are those of the estimate (`estimate_m`, `estimate_rad`) and of path integration
+        alone: of fused self-motion (`fused_m`, `fused_rad`) and, where they publish odometry, of
+        the wheels (`wheels_m`, `wheels_rad`). A summary of the drive has the same.
+
+        Raises as `messages` does, UsageError if there is no pyarrow, and LogError if nobody knows
+        the truth, or the log was begun in the middle of a drive.
+        """
+        entries = self.messages(*FOLLOWED)
+        return path_errors.table(self.path, ((entry.time_s, entry.message) for entry in entries))
+
     def last(self, topic: str | Topic, holds: Callable[[Any], bool]) -> Entry | None:
         """Return the last message on `topic` for which `holds` is true; None if it is for none.
 
@@ -228,6 +245,7 @@ def open_log(path: Path | str) -> Log:
                 print(entry.time_s, entry.message.speed_m_s)
             print(log.frame("truth/pose").to_pandas())
             print(log.path_frame().to_pandas())
+            print(log.errors().to_pandas())
             print(len(log.graph_at(4.0).nodes))
     """
     return Log(LogReader(Path(path)))

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from cogmap.cli.launch.observer import Observer
+from cogmap.evaluation.paths import Paths
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.graph import Delta, Operation, Phase
 from cogmap.schemas.nodes import RECOLLECTION_ID, ROOT_MAP, Map, Recollection
@@ -28,7 +28,7 @@ def delta(version: int, *operations: Operation) -> Delta:
     )
 
 
-def joined() -> Observer:
+def joined() -> Paths:
     """One that has seen the agent drive 4 m ahead, recall a map on which it so stands at (104, 0),
     with the same heading, and drive another metre.
     """
@@ -45,22 +45,21 @@ def joined() -> Observer:
         matched=[""],
         objects=Matrix.of(np.zeros((1, 7))),
     )
-    observer = Observer()
-    observer.update(TruePose(stamp_ns=1, pose=START, travelled_m=4.0, progress=0.0))
-    observer.update(delta(1, agent(x_m=4.0, stamp_ns=1)))
-    observer.update(delta(2, recollection))
-    observer.update(delta(3, Map(id=ROOT_MAP, cell_m=1.0, remembered="remembered:1")))
-    observer.update(delta(4, agent(x_m=105.0, stamp_ns=4)))
-    return observer
+    paths = Paths()
+    paths.update(TruePose(stamp_ns=1, pose=START, travelled_m=4.0, progress=0.0))
+    paths.update(delta(1, agent(x_m=4.0, stamp_ns=1)))
+    paths.update(delta(2, recollection))
+    paths.update(delta(3, Map(id=ROOT_MAP, cell_m=1.0, remembered="remembered:1")))
+    paths.update(delta(4, agent(x_m=105.0, stamp_ns=4)))
+    return paths
 
 
 def test_before_a_map_is_recalled_the_frame_is_that_of_the_start() -> None:
-    observer = Observer()
-    observer.update(TruePose(pose=START, travelled_m=0.0, progress=0.0))
+    paths = Paths()
+    paths.update(TruePose(pose=START, travelled_m=0.0, progress=0.0))
 
-    assert observer.map_frame == START
-    assert observer.recalled == ""
-    assert observer.recalled_m is None
+    assert paths.map_frame == START
+    assert paths.recalled == ""
 
 
 def test_the_path_goes_on_where_it_was_when_a_map_is_recalled() -> None:
@@ -68,15 +67,13 @@ def test_the_path_goes_on_where_it_was_when_a_map_is_recalled() -> None:
 
 
 def test_the_map_lies_where_it_was_learned() -> None:
-    observer = joined()
+    paths = joined()
 
-    frame = observer.map_frame
+    frame = paths.map_frame
     assert frame is not None
     assert (frame.x_m, frame.y_m) == pytest.approx((10.0, -80.0))
-    assert observer.to_world(np.array([[100.0, 0.0]])) == pytest.approx(np.array([[10.0, 20.0]]))
+    assert paths.to_world(np.array([[100.0, 0.0]])) == pytest.approx(np.array([[10.0, 20.0]]))
 
 
-def test_it_is_told_which_map_was_recalled_and_after_how_far() -> None:
-    observer = joined()
-
-    assert (observer.recalled, observer.recalled_m) == ("remembered:1", 4.0)
+def test_it_is_told_which_map_was_recalled() -> None:
+    assert joined().recalled == "remembered:1"

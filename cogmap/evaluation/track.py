@@ -1,4 +1,4 @@
-"""A path in the plane: positions by the time they were sensed at."""
+"""A path in the plane: poses by the time that they are of."""
 
 from __future__ import annotations
 
@@ -11,28 +11,26 @@ from cogmap.geometry.polylines import interpolate
 
 
 class Track:
-    """Positions in the order of their stamps."""
+    """Poses in the order of their stamps."""
 
     def __init__(self) -> None:
         self._stamps_ns: list[int] = []
-        self._points_m: list[tuple[float, float]] = []
+        self._poses: list[tuple[float, float, float]] = []
 
-    def add(self, stamp_ns: int, x_m: float, y_m: float) -> None:
-        """Append a position. It replaces one of the same stamp; one that is out of order is
-        ignored.
-        """
-        point_m = (x_m, y_m)
+    def add(self, stamp_ns: int, x_m: float, y_m: float, heading_rad: float) -> None:
+        """Append a pose. It replaces one of the same stamp; one that is out of order is ignored."""
+        pose = (x_m, y_m, heading_rad)
         last_ns = self.last_ns
 
         if last_ns is None or stamp_ns > last_ns:
             self._stamps_ns.append(stamp_ns)
-            self._points_m.append(point_m)
+            self._poses.append(pose)
         elif stamp_ns == last_ns:
-            self._points_m[-1] = point_m
+            self._poses[-1] = pose
 
     @property
     def last_ns(self) -> int | None:
-        """Return the stamp of the last position; None if there is none."""
+        """Return the stamp of the last pose; None if there is none."""
         return self._stamps_ns[-1] if self._stamps_ns else None
 
     def __len__(self) -> int:
@@ -44,13 +42,18 @@ class Track:
         return np.array(self._stamps_ns, np.int64)
 
     @property
+    def poses(self) -> Floats:
+        """Return the (n, 3) poses."""
+        poses = np.array(self._poses, np.float64)
+        return poses.reshape(-1, 3)
+
+    @property
     def points_m(self) -> Floats:
         """Return the (n, 2) positions."""
-        points_m = np.array(self._points_m, np.float64)
-        return points_m.reshape(-1, 2)
+        return self.poses[:, :2]
 
     def covers(self, stamps_ns: Indices) -> Booleans:
-        """Mark the stamps, of any shape, that lie between the first and the last position."""
+        """Mark the stamps, of any shape, that lie between the first and the last pose."""
         if not self._stamps_ns:
             return np.zeros(stamps_ns.shape, bool)
 
@@ -61,14 +64,18 @@ class Track:
         return after_first & before_last
 
     def at(self, stamps_ns: Indices) -> Floats:
-        """Interpolate positions (k, 2) at (k,) stamps that it covers."""
+        """Interpolate poses (k, 3) at (k,) stamps; outside of the track they are that of its nearer
+        end. A heading turns the shorter way, and is not wrapped. There must be a pose.
+        """
         first_ns = self._stamps_ns[0]
         known_ns = self.stamps_ns - first_ns
         wanted_ns = stamps_ns - first_ns
 
+        poses = self.poses
+        poses[:, 2] = np.unwrap(poses[:, 2])
         known_s = known_ns / 1e9
         wanted_s = wanted_ns / 1e9
-        return interpolate(known_s, self.points_m, wanted_s)
+        return interpolate(known_s, poses, wanted_s)
 
     def new_since_m(self, stamp_ns: int, away_m: float) -> Floats:
         """Return the (n, 2, 2) steps after `stamp_ns` that lead farther than `away_m` past every
@@ -96,7 +103,6 @@ class PathIntegrator:
     def __init__(self) -> None:
         self.track = Track()
         self.travelled_m = 0.0
-        self._headings_rad: dict[int, float] = {}
         self._x_m = 0.0
         self._y_m = 0.0
         self._heading_rad = 0.0
@@ -125,9 +131,8 @@ class PathIntegrator:
         self._heading_rad += turn_rad
 
     def mark(self, stamp_ns: int) -> None:
-        """Append the position that the steps so far have led to."""
-        self.track.add(stamp_ns, self._x_m, self._y_m)
-        self._headings_rad[stamp_ns] = self._heading_rad
+        """Append the pose that the steps so far have led to."""
+        self.track.add(stamp_ns, self._x_m, self._y_m, self._heading_rad)
 
     def pose_at(self, stamp_ns: int) -> Floats:
         """Interpolate the pose (3,) at a stamp; outside of the path it is that of its nearer end,
@@ -136,8 +141,5 @@ class PathIntegrator:
         if not len(self.track):
             return np.zeros(3)
 
-        stamps_ns = self.track.stamps_ns
-        since_ns = stamps_ns - stamps_ns[0]
-        columns = [*self.track.points_m.T, np.array([*self._headings_rad.values()])]
-        wanted_ns = stamp_ns - stamps_ns[0]
-        return np.array([np.interp(wanted_ns, since_ns, each) for each in columns])
+        pose: Floats = self.track.at(np.array([stamp_ns], np.int64))[0]
+        return pose
