@@ -4,12 +4,14 @@ A module:       Module, topics, run_program; its messages are in `cogmap.schemas
 The map:        Graph, near, as_networkx; Replica, snapshot_over (Module.following is shorter)
 Running:        InProcessRunner in one process; Client beside a running system; run_module
 A codelet:      Codelet, CycleContext, Answer; its tasks and nodes are in `cogmap.schemas`
+A drive:        run, FinishedRun
 Recorded logs:  open_log, Log, Entry
 Errors:         CogmapError and its kinds
 """
 
 from __future__ import annotations
 
+from cogmap.cli.run.script import FinishedRun, run
 from cogmap.errors import (
     CogmapError,
     ConfigError,
@@ -42,6 +44,7 @@ __all__ = [
     "ConfigError",
     "CycleContext",
     "Entry",
+    "FinishedRun",
     "Graph",
     "InProcessRunner",
     "Log",
@@ -57,6 +60,7 @@ __all__ = [
     "as_networkx",
     "near",
     "open_log",
+    "run",
     "run_module",
     "run_program",
     "snapshot_over",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import sys
 import time
-from pathlib import Path
 
 import click
 import msgspec
@@ -17,6 +16,7 @@ from cogmap.cli.doctor import installation, system
 from cogmap.cli.doctor.finding import Finding
 from cogmap.cli.doctor.system import Observed
 from cogmap.cli.options import json_option
+from cogmap.cli.run.folder import RUNS
 from cogmap.cli.topic.observing import observing
 from cogmap.errors import NoRouterError
 from cogmap.runtime.delivery.inbox import Inbox
@@ -27,7 +27,6 @@ from cogmap.services import registry
 
 OBSERVE_S = 3.3
 """Three reports of health a process, which come once a second, and a margin."""
-RUNS = Path("runs")
 
 
 @click.command()

@@ -29,7 +29,13 @@ from cogmap.cli.run.options import (
     town_option,
 )
 from cogmap.runtime import config
-from cogmap.runtime.program import agent_option, config_option, connect_option, set_option
+from cogmap.runtime.program import (
+    agent_option,
+    config_option,
+    connect_option,
+    set_option,
+    tied_option,
+)
 from cogmap.services import registry
 
 
@@ -80,6 +86,7 @@ from cogmap.services import registry
     metavar="MODULE",
     help="Do not start this module, but wait for yours; may be repeated, or `all`.",
 )
+@tied_option
 @connect_option
 @agent_option
 @config_option
@@ -105,6 +112,7 @@ def run(
     as_json: bool,
     router: str | None,
     without: tuple[str, ...],
+    tied: bool,
     connect: str,
     agent: str,
     config_path: Path | None,
@@ -153,6 +161,7 @@ def run(
             out=out,
             time_limit_s=time_limit,
             as_json=as_json,
+            tied=tied,
         )
         code = run_drive(start, server)
     sys.exit(code)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,19 +20,19 @@ from cogmap.cli.launch.forking.client import ForkServer
 from cogmap.cli.launch.plan import CONFIG_NAME, Choices, effective
 from cogmap.cli.run import recordings, summary
 from cogmap.cli.run.checks import check_inputs
+from cogmap.cli.run.folder import new_folder
 from cogmap.cli.run.options import AROUND_S, LAP_LIMIT_S
-from cogmap.errors import ConfigError, StorageError
+from cogmap.errors import StorageError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
 from cogmap.services.sim.layout.towns import BLOCKS, LOOP, OSM
-
-RUNS = Path("runs")
 
 
 @dataclass(frozen=True)
 class Start:
     """The options of `cogmap run`: `given` are the settings, `out` is the folder of its files, if
-    None a new one in RUNS; `time_limit_s` is the default if it is None.
+    None a new one in RUNS; `time_limit_s` is the default if it is None. It ends with standard input
+    where it is `tied`.
     """
 
     choices: Choices
@@ -43,6 +42,7 @@ class Start:
     out: Path | None
     time_limit_s: float | None
     as_json: bool
+    tied: bool = False
 
 
 def run_drive(start: Start, server: ForkServer | None) -> int:
@@ -50,7 +50,7 @@ def run_drive(start: Start, server: ForkServer | None) -> int:
 
     Raises UsageError if it cannot be done so, and StorageError if a file cannot be written.
     """
-    stop = Stop()
+    stop = Stop(start.tied)
     choices = recordings.chosen(start.choices, start.given)
     console = Console(stderr=start.as_json)
     given = start.given
@@ -66,7 +66,7 @@ def run_drive(start: Start, server: ForkServer | None) -> int:
     if choices.own_router:
         check_free(start.endpoint)
 
-    folder = _new_folder(start.out)
+    folder = new_folder(start.out)
     drive = Drive(
         folder,
         start.endpoint,
@@ -124,26 +124,6 @@ def _introduce(screen: Display, drive: Drive) -> None:
         modules = ", ".join(drive.choices.without)
         options = f"--connect {drive.endpoint} --config {drive.folder / CONFIG_NAME}"
         screen.show(f"start {modules} yourself with {options}")
-
-
-def _new_folder(out: Path | None) -> Path:
-    """Make `out`, or a folder of RUNS named after the time, which RUNS/latest then links to. Raises
-    ConfigError if it exists or cannot be made.
-    """
-    folder = out or RUNS / time.strftime("%Y-%m-%d-%H%M%S")
-    try:
-        folder.mkdir(parents=True)
-        if out is None:  # the link leads to a folder at any moment: it is replaced, not removed
-            link = RUNS / f".latest-{folder.name}"
-            link.symlink_to(folder.name)
-            link.replace(RUNS / "latest")
-    except FileExistsError:
-        raise ConfigError(f"{folder} exists already: name another with --out") from None
-    except OSError as error:
-        raise ConfigError(
-            f"cannot make the folder {folder} ({error.strerror}): name another with --out"
-        ) from None
-    return folder
 
 
 @contextmanager

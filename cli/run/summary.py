@@ -24,9 +24,9 @@ from cogmap.cli.launch.drive_metrics import (
 )
 from cogmap.cli.launch.outcome import Ending, Outcome
 from cogmap.cli.launch.watch import Watch
+from cogmap.cli.run.folder import SUMMARY_NAME
 from cogmap.recording.storage.format import LOG_NAME
 
-SUMMARY_NAME = "summary.json"
 MAP_NAME = "map.png"
 NAMED = 8
 

@@ -1,0 +1,177 @@
+"""`cogmap.run`: a drive from a script or a notebook."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import tempfile
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+
+import click
+import msgspec
+import numpy as np
+import tomli_w
+
+from cogmap.cli.run.child import DriveProcess, failure
+from cogmap.cli.run.folder import SUMMARY_NAME, link_latest, timed_folder
+from cogmap.errors import ConfigError
+from cogmap.recording import Log, open_log
+from cogmap.runtime import config as configuration
+from cogmap.runtime.config import Sections
+
+if TYPE_CHECKING:
+    from cogmap.cli.launch.drive_metrics import RunMetrics
+
+MAX_LINES = 20
+"""Of what a drive shows, these are kept: the last one says why it failed."""
+
+
+class RunOptions(TypedDict, total=False):
+    """The options of a drive, named as those of `cogmap run`; a path may be a string."""
+
+    seed: int
+    town: str
+    tour: bool
+    explore_s: float
+    goals: Path | str
+    laps: float
+    energy: bool
+    recording: str
+    speed: float
+    lockstep: bool
+    codelets: int
+    memory: Path | str
+    record: bool
+    time_limit_s: float
+    connect: str
+    agent: str
+    config: Path | str
+    settings: Mapping[str, object]
+    out: Path | str
+
+
+_FLAGS = {"explore_s": "--explore", "time_limit_s": "--time-limit"}
+_ELSEWHERE = ("config", "settings", "out")
+
+
+@dataclass(frozen=True)
+class FinishedRun:
+    """A drive that has ended: `summary` has the figures of the summary.json in its `folder`, such
+    as `summary.completed`, `summary.reason` and `summary.estimate.mean_m`.
+    """
+
+    folder: Path
+    summary: RunMetrics
+
+    def log(self) -> Log:
+        """Open its log. Raises LogError if it was not recorded."""
+        return open_log(self.folder)
+
+
+def run(*, quiet: bool = True, **options: Unpack[RunOptions]) -> FinishedRun:
+    """Drive as `cogmap run` does, every module a process of its own, and return when it has ended.
+
+    The options are those of `cogmap run`, by their names: `seed`, `town`, `tour`, `explore_s`,
+    `goals` (a file), `laps`, `energy`, `recording`, `speed`, `lockstep`, `codelets`, `memory`,
+    `record`, `time_limit_s`, `connect`, `agent`, `config`, and `out`, a new folder.
+    `settings` override those of `config`. Unless `quiet`, the progress is printed.
+
+        run = cogmap.run(town="blocks", seed=2, lockstep=True, settings={"sim.duration_s": 20})
+        print(run.summary.estimate.mean_m, run.folder)
+        run.log().errors().to_pandas().plot("time_s", "estimate_m")
+
+    A drive that did not reach its goals ends too: its `summary.reason` says why. Ctrl-C, or a
+    notebook's stop button, ends all its processes, then raises KeyboardInterrupt. Raises
+    UsageError for options that do not fit, and CogmapError if the drive left no summary.
+    """
+    out = options.get("out")
+    folder = timed_folder() if out is None else Path(out)
+    shown: deque[str] = deque(maxlen=MAX_LINES)
+    with (
+        words(options, folder) as given,
+        DriveProcess(given, subprocess.PIPE) as process,
+    ):
+        for line in process.shown:
+            shown.append(line.decode(errors="replace").rstrip())
+            if not quiet:
+                click.echo(shown[-1])
+        code = process.wait()
+
+    summary = summary_in(folder)
+    if summary is None:
+        raise failure(code, "\n".join(shown))
+    if out is None:
+        link_latest(folder)
+    return FinishedRun(folder, summary)
+
+
+@contextmanager
+def words(options: RunOptions, folder: Path) -> Iterator[list[str]]:
+    """Yield the command line's words for `options`, without the command itself, of a drive whose
+    files are in `folder`. Raises ConfigError for settings that cannot be.
+    """
+    found = ["--out", str(folder)]
+    for name, value in options.items():
+        if name not in _ELSEWHERE:
+            found += _words_of(name, value)
+
+    sections = settings_of(options)
+    with tempfile.TemporaryDirectory() as temporary:
+        if sections:
+            path = Path(temporary) / "settings.toml"
+            path.write_text(tomli_w.dumps(sections), encoding="utf-8")
+            found += ["--config", str(path)]
+        yield found
+
+
+def _words_of(name: str, value: object) -> list[str]:
+    """Return the words for one option; none where it is not given, or not chosen."""
+    flag = _FLAGS.get(name, f"--{name}")
+    match value:
+        case None:
+            return []
+        case bool() if name == "record":
+            return [flag if value else "--no-record"]
+        case bool():
+            return [flag] if value else []
+    return [flag, str(value)]
+
+
+def settings_of(options: RunOptions) -> Sections:
+    """Return the settings of `options`: those of its file, or of $COGMAP_CONFIG's, overridden.
+
+    Raises ConfigError for a file that cannot be read and for settings that cannot be.
+    """
+    path = options.get("config") or os.environ.get("COGMAP_CONFIG")
+    sections = configuration.load(Path(path) if path else None)
+    for key, value in options.get("settings", {}).items():
+        section, dot, name = key.partition(".")
+        if not (section and dot and name):
+            raise ConfigError(f"the setting {key!r}: name it as module.key")
+        sections.setdefault(section, {})[name] = _plain(key, value)
+    return sections
+
+
+def _plain(key: str, value: object) -> Any:
+    """Return a value as it can stand in a file of settings. Raises ConfigError."""
+    plain = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    try:
+        tomli_w.dumps({key: plain})
+    except TypeError:
+        raise ConfigError(f"the setting {key} cannot be {value!r}: give what TOML has") from None
+    return plain
+
+
+def summary_in(folder: Path) -> RunMetrics | None:
+    """Return the summary of the drive in `folder`; None if it has none that can be read."""
+    from cogmap.cli.launch.drive_metrics import RunMetrics  # it takes a while to import
+
+    try:
+        return msgspec.json.decode((folder / SUMMARY_NAME).read_bytes(), type=RunMetrics)
+    except (OSError, msgspec.DecodeError):
+        return None
