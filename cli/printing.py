@@ -9,6 +9,7 @@ import click
 import msgspec
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 PIPED_WIDTH = 160
@@ -36,7 +37,7 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Non
             name.rstrip(":"), justify="left" if holds_words else "right", overflow="fold"
         )
     for row in rows:
-        shown.add_row(*map(str, row))
+        shown.add_row(*(escape(str(cell)) for cell in row))
 
     console = Console(soft_wrap=False, highlight=False)
     if not console.is_terminal:

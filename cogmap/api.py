@@ -4,7 +4,7 @@ A module:       Module, topics, run_program; its messages are in `cogmap.schemas
 The map:        Graph, near, as_networkx; Replica, snapshot_over (Module.following is shorter)
 Running:        InProcessRunner in one process; Client beside a running system; run_module
 A codelet:      Codelet, CycleContext, Answer; its tasks and nodes are in `cogmap.schemas`
-A drive:        run, FinishedRun
+Drives:         run, FinishedRun; sweep, Sweep with many seeds and settings
 Recorded logs:  open_log, Log, Entry
 Errors:         CogmapError and its kinds
 """
@@ -12,6 +12,8 @@ Errors:         CogmapError and its kinds
 from __future__ import annotations
 
 from cogmap.cli.run.script import FinishedRun, run
+from cogmap.cli.sweep.result import Sweep
+from cogmap.cli.sweep.script import sweep
 from cogmap.errors import (
     CogmapError,
     ConfigError,
@@ -56,6 +58,7 @@ __all__ = [
     "PortInUseError",
     "Replica",
     "StorageError",
+    "Sweep",
     "UsageError",
     "as_networkx",
     "near",
@@ -64,5 +67,6 @@ __all__ = [
     "run_module",
     "run_program",
     "snapshot_over",
+    "sweep",
     "topics",
 ]

@@ -31,10 +31,11 @@ MAX_LINES = 20
 """Of what a drive shows, these are kept: the last one says why it failed."""
 
 
-class RunOptions(TypedDict, total=False):
-    """The options of a drive, named as those of `cogmap run`; a path may be a string."""
+class DriveOptions(TypedDict, total=False):
+    """The options of `cogmap run` that many drives can share, by their names; a path may be a
+    string.
+    """
 
-    seed: int
     town: str
     tour: bool
     explore_s: float
@@ -45,13 +46,19 @@ class RunOptions(TypedDict, total=False):
     speed: float
     lockstep: bool
     codelets: int
-    memory: Path | str
     record: bool
     time_limit_s: float
-    connect: str
     agent: str
     config: Path | str
+
+
+class RunOptions(DriveOptions, total=False):
+    """The options of one drive: those too that it shares with no other."""
+
+    seed: int
     settings: Mapping[str, object]
+    memory: Path | str
+    connect: str
     out: Path | str
 
 
@@ -115,11 +122,7 @@ def words(options: RunOptions, folder: Path) -> Iterator[list[str]]:
     """Yield the command line's words for `options`, without the command itself, of a drive whose
     files are in `folder`. Raises ConfigError for settings that cannot be.
     """
-    found = ["--out", str(folder)]
-    for name, value in options.items():
-        if name not in _ELSEWHERE:
-            found += _words_of(name, value)
-
+    found = ["--out", str(folder), *option_words(options)]
     sections = settings_of(options)
     with tempfile.TemporaryDirectory() as temporary:
         if sections:
@@ -129,6 +132,15 @@ def words(options: RunOptions, folder: Path) -> Iterator[list[str]]:
         yield found
 
 
+def option_words(options: RunOptions) -> list[str]:
+    """Return the words for all of `options` but the settings and the folder, by their names."""
+    found = []
+    for name, value in sorted(options.items()):
+        if name not in _ELSEWHERE:
+            found += _words_of(name, value)
+    return found
+
+
 def _words_of(name: str, value: object) -> list[str]:
     """Return the words for one option; none where it is not given, or not chosen."""
     flag = _FLAGS.get(name, f"--{name}")
@@ -136,7 +148,7 @@ def _words_of(name: str, value: object) -> list[str]:
         case None:
             return []
         case bool() if name == "record":
-            return [flag if value else "--no-record"]
+            return [] if value else ["--no-record"]
         case bool():
             return [flag] if value else []
     return [flag, str(value)]

@@ -29,10 +29,10 @@ def test_options_are_those_of_the_command() -> None:
 
     assert words_of(options) == [
         *("--out", "there"),
-        *("--seed", "3"),
         *("--explore", "20.0"),
         "--lockstep",
         "--no-record",
+        *("--seed", "3"),
     ]
 
 
