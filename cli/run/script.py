@@ -23,6 +23,7 @@ from cogmap.errors import ConfigError
 from cogmap.recording import Log, open_log
 from cogmap.runtime import config as configuration
 from cogmap.runtime.config import Sections
+from cogmap.runtime.environment import CONFIG
 
 if TYPE_CHECKING:
     from cogmap.cli.launch.drive_metrics import RunMetrics
@@ -159,7 +160,7 @@ def settings_of(options: RunOptions) -> Sections:
 
     Raises ConfigError for a file that cannot be read and for settings that cannot be.
     """
-    path = options.get("config") or os.environ.get("COGMAP_CONFIG")
+    path = options.get("config") or os.environ.get(CONFIG)
     sections = configuration.load(Path(path) if path else None)
     for key, value in options.get("settings", {}).items():
         section, dot, name = key.partition(".")

@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from types import TracebackType
 
-from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.runtime import environment
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 
@@ -17,8 +17,9 @@ IDLE_S = 0.05
 class Client:
     """Runs `module` on a thread of its own while in a `with` statement.
 
-    It is connected to the router at `endpoint`, as one of `agent`'s. Raises NoRouterError if
-    none answers. Handlers are called on that thread; what ends it early is raised at the end.
+    It is connected to the router at `endpoint`, as one of `agent`'s; by default to the router at
+    $COGMAP_CONNECT, as one of $COGMAP_AGENT's, as the modules are. Raises NoRouterError if none
+    answers. Handlers are called on that thread; what ends it early is raised at the end.
 
         graph = Graph()
         with Client(Module("notebook").following(graph)):
@@ -27,11 +28,11 @@ class Client:
     """
 
     def __init__(
-        self, module: Module, endpoint: str = DEFAULT_ENDPOINT, agent: str = DEFAULT_AGENT
+        self, module: Module, endpoint: str | None = None, agent: str | None = None
     ) -> None:
         self.module = module
-        self._endpoint = endpoint
-        self._agent = agent
+        self._endpoint = endpoint or environment.endpoint()
+        self._agent = agent or environment.agent()
         self._ended = threading.Event()
         self._thread: threading.Thread | None = None
         self._error: Exception | None = None

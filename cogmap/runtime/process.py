@@ -10,8 +10,9 @@ import threading
 from pathlib import Path
 from types import FrameType
 
-from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name, open_router
+from cogmap.bus.session import check_name, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.runtime import environment
 from cogmap.runtime.heap import keep_freed_memory
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
@@ -86,8 +87,8 @@ def give_way() -> None:
 
 def run_module(
     module: Module,
-    endpoint: str = DEFAULT_ENDPOINT,
-    agent: str = DEFAULT_AGENT,
+    endpoint: str | None = None,
+    agent: str | None = None,
     state: Path | None = None,
     *,
     tied: bool = False,
@@ -96,10 +97,11 @@ def run_module(
     """Run `module` as this process until a signal to end or, if it is `tied`, the end of its
     parent.
 
-    It connects to the router at `endpoint` as one of `agent`'s; what it must keep is in the folder
-    `state`, and what it remembers for later runs in the database `memory`. Raises NoRouterError,
-    StorageError if that folder cannot be written or the database cannot be read, and UsageError for
-    an instance's name that cannot be part of a key.
+    It connects to the router at `endpoint` as one of `agent`'s, by default those of $COGMAP_CONNECT
+    and $COGMAP_AGENT; what it must keep is in the folder `state`, and what it remembers for later
+    runs in the database `memory`. Raises NoRouterError, StorageError if that folder cannot be
+    written or the database cannot be read, and UsageError for a name of an instance or an agent
+    that cannot be part of a key.
     """
     check_name("--instance", module.instance)
     keep_freed_memory()
@@ -113,7 +115,7 @@ def run_module(
             journal = Journal(state / f"{module.instance}.journal")
 
     store = Store(memory) if memory is not None and module.remembers else None
-    bus = ZenohBus(endpoint, agent)
+    bus = ZenohBus(endpoint or environment.endpoint(), agent or environment.agent())
     stop = Stop(tied)  # only now: until a router answers, a signal ends the process at once
     shell = Shell(module, bus, journal, counts=counts, store=store)
     try:

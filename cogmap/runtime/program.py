@@ -10,7 +10,7 @@ import click
 import msgspec
 
 from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name
-from cogmap.runtime import config
+from cogmap.runtime import config, environment
 from cogmap.runtime.command import run_command
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
@@ -23,7 +23,7 @@ connect_option = click.option(
     "--connect",
     default=DEFAULT_ENDPOINT,
     show_default=True,
-    envvar="COGMAP_CONNECT",
+    envvar=environment.CONNECT,
     help="Where the router listens.",
 )
 
@@ -39,14 +39,14 @@ agent_option = click.option(
     callback=_checked,
     default=DEFAULT_AGENT,
     show_default=True,
-    envvar="COGMAP_AGENT",
+    envvar=environment.AGENT,
     help="The agent whose topics are meant, if several share a bus.",
 )
 config_option = click.option(
     "--config",
     "config_path",
     type=click.Path(path_type=Path),
-    envvar="COGMAP_CONFIG",
+    envvar=environment.CONFIG,
     help="A file of settings in TOML, as `cogmap config` prints it.",
 )
 set_option = click.option(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -114,6 +115,38 @@ def test_a_notebook_follows_the_graph_of_a_running_system(over_zenoh: OverZenoh)
 
     assert graph.version == 1
     assert list(graph.nodes) == ["object:house"]
+
+
+def test_a_notebook_joins_where_the_environment_says(
+    over_zenoh: OverZenoh, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COGMAP_CONNECT", over_zenoh.endpoint)
+    monkeypatch.setenv("COGMAP_AGENT", over_zenoh.agent)
+    peer = over_zenoh.join()
+
+    with cogmap.Client(cogmap.Module("notebook")):
+        await_members(peer, Member("notebook", "notebook"))
+
+
+def test_an_agent_of_the_environment_that_cannot_be_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COGMAP_AGENT", "a/b")
+
+    with pytest.raises(cogmap.UsageError, match=r"\$COGMAP_AGENT 'a/b': use letters"):
+        cogmap.Client(cogmap.Module("notebook"))
+
+
+def test_a_module_runs_where_the_environment_says(over_zenoh: OverZenoh) -> None:
+    program = "from cogmap import Module, run_module; run_module(Module('lodger'))"
+    places = {"COGMAP_CONNECT": over_zenoh.endpoint, "COGMAP_AGENT": over_zenoh.agent}
+    peer = over_zenoh.join()
+    process = subprocess.Popen([sys.executable, "-c", program], env=os.environ | places)
+    try:
+        await_members(peer, Member("lodger", "lodger"))
+    finally:
+        process.terminate()
+        process.wait()
 
 
 def test_a_log_is_read_with_its_graph() -> None:
