@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 import tomli_w
 
-from cogmap.cli.run.child import DriveProcess, failure
+from cogmap.cli.run.child import USAGE_EXIT, DriveProcess, failure
 from cogmap.cli.run.folder import SUMMARY_NAME, link_latest, timed_folder
 from cogmap.errors import ConfigError
 from cogmap.recording import Log, open_log
@@ -43,8 +43,6 @@ class DriveOptions(TypedDict, total=False):
     goals: Path | str
     laps: float
     energy: bool
-    recording: str
-    speed: float
     lockstep: bool
     codelets: int
     record: bool
@@ -57,6 +55,8 @@ class RunOptions(DriveOptions, total=False):
     """The options of one drive: those too that it shares with no other."""
 
     seed: int
+    recording: str
+    speed: float
     settings: Mapping[str, object]
     memory: Path | str
     connect: str
@@ -110,12 +110,10 @@ def run(*, quiet: bool = True, **options: Unpack[RunOptions]) -> FinishedRun:
                 click.echo(shown[-1])
         code = process.wait()
 
-    summary = summary_in(folder)
-    if summary is None:
-        raise failure(code, "\n".join(shown))
+    finished = FinishedRun(folder, summary_after(folder, code, "\n".join(shown)))
     if out is None:
         link_latest(folder)
-    return FinishedRun(folder, summary)
+    return finished
 
 
 @contextmanager
@@ -162,7 +160,7 @@ def settings_of(options: RunOptions) -> Sections:
     """
     path = options.get("config") or os.environ.get(CONFIG)
     sections = configuration.load(Path(path) if path else None)
-    for key, value in options.get("settings", {}).items():
+    for key, value in (options.get("settings") or {}).items():
         section, dot, name = key.partition(".")
         if not (section and dot and name):
             raise ConfigError(f"the setting {key!r}: name it as module.key")
@@ -178,6 +176,17 @@ def _plain(key: str, value: object) -> Any:
     except TypeError:
         raise ConfigError(f"the setting {key} cannot be {value!r}: give what TOML has") from None
     return plain
+
+
+def summary_after(folder: Path, code: int, shown: str) -> RunMetrics:
+    """Return the summary that a drive left in `folder`, which ended with `code` and had `shown` so
+    much. Raises UsageError if it could not be driven so, CogmapError if it left no summary.
+    """
+    # One that could not be driven may be so as another drive is there, whose summary is not its.
+    summary = None if code == USAGE_EXIT else summary_in(folder)
+    if summary is None:
+        raise failure(code, shown)
+    return summary
 
 
 def summary_in(folder: Path) -> RunMetrics | None:

@@ -19,7 +19,9 @@ from cogmap.version import VERSION
 PLAN_NAME = "sweep.json"
 MAX_NAME = 120
 OWN = RunOptions.__annotations__.keys() - DriveOptions.__annotations__.keys()
-"""The options that a sweep chooses for each drive; a memory would let one depend on another."""
+"""The options of a drive that a sweep does not take: it chooses some for each drive, a recording
+leaves no choice of a seed, and a memory would let one drive depend on another.
+"""
 Settings = Mapping[str, object]
 
 
@@ -57,11 +59,11 @@ def plan(
     a folder of `folder`; `common` are settings of all.
 
     Raises UsageError if there is none, for one that is there twice, and for an option that a sweep
-    chooses itself.
+    does not take.
     """
     refused = sorted(OWN & options.keys())
     if refused:
-        raise UsageError(f"a sweep chooses {', '.join(refused)} for each drive: leave it out")
+        raise UsageError(f"a sweep takes no {' and no '.join(refused)}: leave it out")
 
     drives: dict[Path, PlannedDrive] = {}
     for variant, seed in itertools.product(variants, seeds):

@@ -10,9 +10,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from cogmap.bus.session import free_endpoint
-from cogmap.cli.run.child import DriveProcess, failure
-from cogmap.cli.run.script import RunOptions, summary_in, words
+from cogmap.cli.run.child import DriveProcess
+from cogmap.cli.run.script import RunOptions, summary_after, words
 from cogmap.cli.sweep.plan import PlannedDrive
+from cogmap.errors import CogmapError
 from cogmap.recording.storage.reader import Progress
 
 POLL_S = 0.1
@@ -40,11 +41,13 @@ class RunningDrive:
 
     def error(self) -> str:
         """Return why one that has ended left no summary; empty if it did leave one."""
-        if summary_in(self.drive.folder) is not None:
-            return ""
-        code = self._process.wait()
         self._shown.seek(0)
-        return str(failure(code, self._shown.read().decode(errors="replace")))
+        shown = self._shown.read().decode(errors="replace")
+        try:
+            summary_after(self.drive.folder, self._process.wait(), shown)
+        except CogmapError as error:
+            return str(error)
+        return ""
 
     def close(self) -> None:
         """End it, if it has not ended, and all that was for it."""

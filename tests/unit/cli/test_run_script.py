@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from cogmap.cli.run.child import failure
-from cogmap.cli.run.script import RunOptions, settings_of, summary_in, words
+from cogmap.cli.run.script import RunOptions, settings_of, summary_after, summary_in, words
 from cogmap.errors import CogmapError, ConfigError, UsageError
+from tests.support.world.summaries import summary, write_summary
 
 
 def words_of(options: RunOptions) -> list[str]:
@@ -83,6 +84,14 @@ def test_the_error_of_a_drive_is_the_last_that_it_showed() -> None:
     assert (type(of_usage), str(of_usage)) == (UsageError, "No such option '--sed'.")
     assert (type(of_ours), str(of_ours)) == (CogmapError, "the disk is full")
     assert "ended with code -9" in str(failure(-9, ""))
+
+
+def test_the_summary_of_another_drive_is_not_taken_for_its_own(tmp_path: Path) -> None:
+    write_summary(tmp_path, summary(seed=3))
+
+    assert summary_after(tmp_path, 1, "").seed == 3
+    with pytest.raises(UsageError, match="exists already"):
+        summary_after(tmp_path, 2, "cogmap: there exists already")
 
 
 def test_a_summary_that_is_missing_or_cut_is_none(tmp_path: Path) -> None:

@@ -49,7 +49,7 @@ def test_a_value_with_a_path_in_it_names_a_folder(tmp_path: Path) -> None:
     [
         ([1, 1], {}, "seed-1 is there twice"),
         ([], {}, "needs a seed"),
-        ([1], {"memory": "town.db", "out": "there"}, "a sweep chooses memory, out for each"),
+        ([1], {"memory": "town.db", "out": "there"}, "takes no memory and no out: leave it"),
     ],
 )
 def test_a_sweep_that_cannot_be_is_refused(
