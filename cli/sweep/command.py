@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-import re
 import sys
-import tomllib
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
@@ -27,15 +23,14 @@ from cogmap.cli.run.options import (
 )
 from cogmap.cli.run.script import DriveOptions
 from cogmap.cli.sweep.execution import drive_all
+from cogmap.cli.sweep.options import every_variant, read_seeds
 from cogmap.cli.sweep.plan import label
 from cogmap.cli.sweep.result import SHOWN, Statistics, Sweep
 from cogmap.cli.sweep.script import SWEEP
-from cogmap.errors import ConfigError, UsageError
+from cogmap.errors import UsageError
 from cogmap.runtime import config
 from cogmap.runtime.program import config_option, set_option
 
-MAX_SEEDS = 10_000
-_SEEDS = re.compile(r"(\d+)(?:-(\d+))?")
 _EPILOG = """\b
 Examples:
   cogmap sweep --seeds 1-5 --town blocks --explore 30
@@ -44,49 +39,12 @@ Examples:
 """
 
 
-def _seeds(context: click.Context, option: click.Parameter, text: str) -> list[int]:
-    """Read seeds such as 1-5,8. Raises UsageError."""
-    seeds: list[int] = []
-    for part in text.split(","):
-        found = _SEEDS.fullmatch(part.strip())
-        if found is None:
-            raise UsageError(f"--seeds {text}: write seeds and ranges of them, such as 1-5,8")
-        first = int(found[1])
-        last = int(found[2] or first)
-        if not 0 <= last - first < MAX_SEEDS:
-            raise UsageError(f"--seeds {text}: {part} is no range of up to {MAX_SEEDS} seeds")
-        seeds += range(first, last + 1)
-    return seeds
-
-
-def every_variant(texts: Sequence[str]) -> list[dict[str, Any]]:
-    """Read every combination of the values of settings such as motor.cruise_m_s=2,3. Raises
-    ConfigError.
-    """
-    choices = []
-    for text in texts:
-        key, equals, values = text.partition("=")
-        if not (equals and values):
-            raise ConfigError(f"--vary {text}: write it as module.key=value,value")
-        choices.append([(key, value) for value in _values(values)])
-    return [dict(combination) for combination in itertools.product(*choices)]
-
-
-def _values(text: str) -> list[Any]:
-    """Read values that commas part: as TOML has them, or words, which need no quotes."""
-    try:
-        values: list[Any] = tomllib.loads(f"values = [{text}]")["values"]
-    except tomllib.TOMLDecodeError:
-        return [word.strip() for word in text.split(",")]
-    return values
-
-
 @click.command("sweep", epilog=_EPILOG)
 @click.option(
     "--seeds",
     default="1-5",
     show_default=True,
-    callback=_seeds,
+    callback=lambda _context, _option, text: read_seeds(text),
     help="Drive once with each of these seeds: numbers, and ranges of them.",
 )
 @click.option(
@@ -116,7 +74,8 @@ def _values(text: str) -> list[Any]:
     "time_limit_s",
     type=FiniteRange(5, 1e6),
     metavar="SECONDS",
-    help="End each drive after this much time.  [default: that of `cogmap run`]",
+    help="End each drive after this much time.  [default: an hour in lockstep, else that of "
+    "`cogmap run`]",
 )
 @click.option(
     "--processes",

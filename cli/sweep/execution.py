@@ -11,6 +11,11 @@ from cogmap.cli.sweep.plan import PlannedDrive, Settings, left_to_drive, plan
 from cogmap.cli.sweep.result import Sweep, SweptDrive
 from cogmap.cli.sweep.running import run_all
 
+STEPPED_LIMIT_S = 3600.0
+"""The wall-clock time that a drive in lockstep may take: a busy machine must not change its end.
+Simulated time is limited anyway, and what stands still is ended before.
+"""
+
 
 def drive_all(
     folder: Path,
@@ -23,8 +28,10 @@ def drive_all(
     """Drive with each variant of the settings and each seed what is not in `folder` yet, in
     lockstep unless `options` say otherwise. Raises as `plan` and `left_to_drive` do.
     """
-    stepped: DriveOptions = {"lockstep": True, **options}
-    drives = plan(folder, seeds, variants, common, stepped)
+    chosen: DriveOptions = {"lockstep": True, **options}
+    if chosen["lockstep"]:
+        chosen.setdefault("time_limit_s", STEPPED_LIMIT_S)
+    drives = plan(folder, seeds, variants, common, chosen)
     left = left_to_drive(folder, drives)
     with bar(f"{len(left)} of {len(drives)} drives") as progress:
         errors = run_all(left, processes, progress)
