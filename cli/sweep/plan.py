@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import json
 import re
@@ -119,7 +120,10 @@ def _name(settings: Settings, seed: int) -> str:
     """Return the name of a drive's folder."""
     if not settings:
         return f"seed-{seed}"
-    safe = re.sub(r"[^\w.=+-]+", "_", label(settings))[:MAX_NAME]
+    safe = re.sub(r"[^\w.=+-]+", "_", label(settings))
+    if len(safe) > MAX_NAME:
+        digest = hashlib.sha256(safe.encode()).hexdigest()
+        safe = f"{safe[:MAX_NAME]}-{digest[:8]}"
     return f"{safe}-seed-{seed}"
 
 

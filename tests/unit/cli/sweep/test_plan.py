@@ -44,6 +44,16 @@ def test_a_value_with_a_path_in_it_names_a_folder(tmp_path: Path) -> None:
     assert drive.folder == tmp_path / "sim.town=osm_.._a_b.osm-seed-1"
 
 
+def test_variants_that_begin_alike_have_folders_of_their_own(tmp_path: Path) -> None:
+    long = "x" * 300
+    variants = [{"sim.town": f"osm:{long}{last}"} for last in "ab"]
+
+    one, other = plan(tmp_path, [1], variants, {}, {})
+
+    assert one.folder != other.folder
+    assert len(one.folder.name) < 150
+
+
 @pytest.mark.parametrize(
     ("seeds", "options", "sentence"),
     [
