@@ -9,7 +9,7 @@ import click
 
 from cogmap.bus.interface import Arrival, Bus
 from cogmap.cli.topic.observing import observing
-from cogmap.cli.topic.pub import Publisher
+from cogmap.cli.topic.publishing import Publisher
 from cogmap.errors import NoAnswerError
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
@@ -72,10 +72,10 @@ def ask(bus: Bus, pause: Pause, timeout_s: float, try_s: float = TRY_S) -> None:
     inbox = Inbox()
     intake = Intake()
     bus.subscribe(topics.PAUSED, inbox.put, intake.count_lost)
-    publisher = Publisher(bus, topics.PAUSE, pause)
+    publisher = Publisher(bus, topics.PAUSE)
     until_s = time.monotonic() + timeout_s
     while time.monotonic() < until_s:
-        publisher.publish()
+        publisher.publish(pause)
         with suppress(NoAnswerError):
             _await(inbox, intake, pause.is_paused, min(try_s, until_s - time.monotonic()))
             return

@@ -11,7 +11,7 @@ from cogmap.bus.interface import Arrival, Bus
 from cogmap.cli.options import json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.topic.observing import observing
-from cogmap.cli.topic.pub import Publisher
+from cogmap.cli.topic.publishing import Publisher
 from cogmap.errors import NoAnswerError, UsageError
 from cogmap.hints import did_you_mean
 from cogmap.runtime.delivery.inbox import Inbox
@@ -101,10 +101,10 @@ def change(closure: StreetClosure, connect: str, agent: str) -> None:
     with observing(connect, agent, "street") as bus:
         towns = Towns(bus)
         check_known(towns.next(ANSWER_S), closure.street)
-        publisher = Publisher(bus, topics.STREET_CLOSURE, closure)
+        publisher = Publisher(bus, topics.STREET_CLOSURE)
         until_s = time.monotonic() + ANSWER_S
         while time.monotonic() < until_s:
-            publisher.publish()
+            publisher.publish(closure)
             with suppress(NoAnswerError):
                 if is_as_asked(towns.next(TRY_S), closure):
                     click.echo(f"{closure.street} is {done}")

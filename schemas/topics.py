@@ -40,7 +40,8 @@ class Topic:
     happens.
 
     Latency is counted from the messages that are `sensed`: they derive from the world, not from
-    other messages.
+    other messages. Several modules may publish one that is `shared` at once; of any other the
+    messages of a second publisher would contradict those of the first.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Topic:
     max_bytes: int = MIB
     keep_in_log: bool = True
     sensed: bool = False
+    shared: bool = False
 
     @property
     def carries_images(self) -> bool:
@@ -82,8 +84,8 @@ PERCEPTS = Topic("epam/percepts", sensing.Percepts, 5, _NEVER)
 LEARNED = Topic("epam/learned", sensing.Learned, 0, _NEVER, max_bytes=64 * MIB)
 TASK = Topic("workspace/task", codelets.Task, 0, _NEVER)
 LEASES = Topic("workspace/leases", codelets.Leases, 0, _NEVER, Scope.PROCESS)
-PROPOSAL = Topic("codelets/proposal", codelets.Proposal, 0, _NEVER, max_bytes=64 * MIB)
-OFFER = Topic("workspace/offer", codelets.Offer, 0, _NEVER, max_bytes=16 * MIB)
+PROPOSAL = Topic("codelets/proposal", codelets.Proposal, 0, _NEVER, max_bytes=64 * MIB, shared=True)
+OFFER = Topic("workspace/offer", codelets.Offer, 0, _NEVER, max_bytes=16 * MIB, shared=True)
 DELTA = Topic("workspace/delta", graph.Delta, 0, _NEVER, max_bytes=64 * MIB)
 SNAPSHOT = Topic("workspace/snapshot", graph.Snapshot, 0, _REQUEST, max_bytes=512 * MIB)
 SNAPSHOT_REQUEST = Topic("workspace/snapshot_request", graph.SnapshotRequest, 0, _REQUEST)
@@ -93,13 +95,13 @@ COALITIONS = Topic("workspace/coalitions", cognition.Coalitions, 5, _NEVER)
 COMPETITION = Topic("global_workspace/competition", cognition.Competition, 5, _NEVER)
 BROADCAST = Topic("global_workspace/broadcast", cognition.Broadcast, 0, _NEVER)
 STORED = Topic("memory/stored", memory.Stored, 0, _NEVER, max_bytes=64 * MIB)
-RESTORED = Topic("memory/restored", memory.Restored, 0, _NEVER, max_bytes=512 * MIB)
+RESTORED = Topic("memory/restored", memory.Restored, 0, _NEVER, max_bytes=512 * MIB, shared=True)
 BEHAVIOURS = Topic("procedural/behaviours", cognition.Behaviours, 0, _NEVER, max_bytes=16 * MIB)
 ACTION = Topic("action/selected", cognition.Action, 0, _NEVER)
 MOTOR_PROGRAM = Topic("motor/program", cognition.MotorProgram, 0, _NEVER)
 MOTOR_COMMAND = Topic("motor/command", sensing.MotorCommand, 5, _NEVER)
-STREET_CLOSURE = Topic("sim/street", sensing.StreetClosure, 0, _NEVER)
-PAUSE = Topic("sim/pause", process.Pause, 0, _NEVER, Scope.PROCESS)
+STREET_CLOSURE = Topic("sim/street", sensing.StreetClosure, 0, _NEVER, shared=True)
+PAUSE = Topic("sim/pause", process.Pause, 0, _NEVER, Scope.PROCESS, shared=True)
 PAUSED = Topic("sim/paused", process.Paused, 0, _NEVER, Scope.PROCESS)
 TRUE_POSE = Topic("truth/pose", sensing.TruePose, 20, _LATEST, Scope.TRUTH, sensed=True)
 TRUE_TOWN = Topic(
@@ -112,8 +114,8 @@ TRUE_TOWN = Topic(
     sensed=True,
 )
 PLAYBACK = Topic("truth/playback", process.Playback, 0, _NEVER, Scope.TRUTH, sensed=True)
-PRESENCE = Topic("presence", process.Presence, 0, _NEVER, Scope.PROCESS)
-HEALTH = Topic("health", process.Health, 0, _LATEST, Scope.PROCESS)
+PRESENCE = Topic("presence", process.Presence, 0, _NEVER, Scope.PROCESS, shared=True)
+HEALTH = Topic("health", process.Health, 0, _LATEST, Scope.PROCESS, shared=True)
 
 ALL: tuple[Topic, ...] = tuple(
     value for value in list(globals().values()) if isinstance(value, Topic)

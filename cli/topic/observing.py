@@ -78,11 +78,13 @@ class RouterWatch:
 
 
 @contextmanager
-def observing(connect: str, agent: str, verb: str) -> Iterator[ZenohBus]:
-    """Open a bus on which others see this process as `cli-verb`. Raises NoRouterError."""
+def observing(connect: str, agent: str, who: str | Member) -> Iterator[ZenohBus]:
+    """Open a bus on which others see this process as `who`, a verb as `cli-verb`. Raises
+    NoRouterError.
+    """
     bus = ZenohBus(connect, agent)
     try:
-        bus.identify(Member(CLI, f"{CLI}-{verb}"))
+        bus.identify(who if isinstance(who, Member) else Member(CLI, f"{CLI}-{who}"))
         yield bus
     finally:
         bus.close()

@@ -1,4 +1,4 @@
-"""Parses a message that a user wrote as JSON or YAML."""
+"""Parses a message that a user wrote as JSON or YAML, and shows how to write one."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ import msgspec
 import numpy as np
 import yaml
 
-from cogmap.errors import UsageError
+from cogmap.bus.codec import decode, encode
+from cogmap.errors import MessageError, UsageError
 from cogmap.hints import did_you_mean
 from cogmap.schemas.array import DTYPES
 from cogmap.schemas.base import Message
+from cogmap.schemas.examples import example
+from cogmap.schemas.render import ONE_LINE, to_jsonable
 from cogmap.schemas.topics import Topic
 
 
@@ -32,7 +35,22 @@ def parse(topic: Topic, text: str) -> Message:
     unknown = _unknown(plain, msgspec.to_builtins(message), "")
     if unknown is not None:
         raise UsageError(f"{topic.name}: {unknown}")
+    try:
+        decode(topic, encode(message))  # as a subscriber does, who rejects what is out of range
+    except MessageError as error:
+        raise UsageError(str(error)) from None
     return message
+
+
+def pattern(topic: Topic) -> str:
+    """Write an example of the messages on `topic` in YAML, which `parse` reads; what the publisher
+    fills in is left out.
+    """
+    plain = to_jsonable(example(topic), full=True)
+    for name in Message.__struct_fields__:
+        del plain[name]
+    text: str = yaml.safe_dump(plain, sort_keys=False, allow_unicode=True, width=ONE_LINE)
+    return text.rstrip("\n")
 
 
 def _read(text: str) -> Any:

@@ -22,6 +22,7 @@ from tests.support.system.networks import routed
 TIMEOUT_S = 30.0
 PERIOD_NS = 20_000_000
 TEXT_FOR_A_NUMBER = '{"left_wheel_rad_s": "x", "right_wheel_rad_s": 1}'
+ODOMETRY = '{"speed_m_s": 1, "turn_rate_rad_s": 0, "dt_s": 0.02}'
 EXAMPLES = {topics.of(message): message for message in example_messages()}
 
 
@@ -153,6 +154,7 @@ def test_pub_is_obeyed(robot: Robot, endpoint: str) -> None:
     ("arguments", "sentence"),
     [
         (("pub", "-1", "motor/command", TEXT_FOR_A_NUMBER), "got `str` - at"),
+        (("pub", "-1", "odometry", ODOMETRY), "sim publishes odometry already"),
         (("echo", "odometri"), "did you mean 'odometry'?"),
         (("echo", "odometry", "--field", "speed"), "no 'speed'"),
         (("echo", "workspace/snapshot"), "answered on request"),

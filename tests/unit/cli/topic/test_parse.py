@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 
 import pytest
+from click.testing import CliRunner
 
 from cogmap.cli.topic.argument import streamed_topic, topic_named
+from cogmap.cli.topic.documents import documents
 from cogmap.cli.topic.echo import formatter
-from cogmap.cli.topic.parse import parse
+from cogmap.cli.topic.parse import parse, pattern
+from cogmap.cli.topic.pub import pub
 from cogmap.errors import UsageError
 from cogmap.schemas import topics
 from cogmap.schemas.examples import example_messages
@@ -126,3 +129,35 @@ def test_a_message_may_be_written_as_yaml_as_for_ros2_topic_pub() -> None:
 def test_what_is_neither_json_nor_yaml_is_named() -> None:
     with pytest.raises(UsageError, match="neither JSON nor YAML"):
         parse(topics.MOTOR_COMMAND, "{left_wheel_rad_s: [")
+
+
+@pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
+def test_the_pattern_of_a_message_can_be_published(topic: Topic) -> None:
+    message = parse(topic, pattern(topic))
+
+    assert (message.stamp_ns, message.source) == (0, "")
+
+
+def test_documents_are_lines_of_json_or_yaml_between_dashes() -> None:
+    text = '{"a": 1}\n{"a": 2}\na: 3\nb: 4\n---\n\n---\n{a: 5}\n'
+
+    found = list(documents(text.splitlines(keepends=True)))
+
+    assert found == ['{"a": 1}', '{"a": 2}', "a: 3\nb: 4", "{a: 5}"]
+
+
+def test_pub_without_a_message_prints_a_pattern_and_publishes_nothing() -> None:
+    result = CliRunner().invoke(pub, ["motor/command"])
+
+    assert result.exit_code == 0
+    assert "left_wheel_rad_s: " in result.stdout
+    assert "nothing is published" in result.stderr
+
+
+def test_a_wrong_message_on_standard_input_is_named_by_its_number() -> None:
+    written = "left_wheel_rad_s: 1\nright_wheel_rad_s: 2\n---\nleft_wheel_rad_s: x\n"
+
+    result = CliRunner().invoke(pub, ["motor/command", "--stdin"], input=written)
+
+    assert isinstance(result.exception, UsageError)
+    assert str(result.exception).startswith("message 2 on standard input: motor/command: ")
