@@ -1,4 +1,4 @@
-"""Which cycle of a log is meant: by its number, by a time of the drive, or the last broadcast."""
+"""Which cycle of a log is meant: by its number, by a time of the log, or the last broadcast."""
 
 from __future__ import annotations
 
@@ -8,11 +8,18 @@ from dataclasses import dataclass
 from cogmap.errors import LogError, UsageError
 from cogmap.recording.log import Log
 from cogmap.schemas import topics
+from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Broadcast, Competition
 from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.topics import Topic
 
 CYCLES = (topics.DELTA, topics.COMPETITION)
+BACK_S = 2.0
+"""Some ten cycles; where there is none, further back is searched."""
+
+SHOWN_S = 0.0005
+"""Times are shown to the millisecond: one that is copied means what it was shown for."""
+
 NEEDED = (topics.BROADCAST, topics.ACTION)
 
 
@@ -26,16 +33,19 @@ class Cycle:
 
 @dataclass(frozen=True)
 class Covered:
-    """The first cycle of a log and the last."""
+    """The numbers of the first cycle of a log and of the last, and when, in seconds into the log,
+    the first was begun and the log ends.
+    """
 
-    first: Cycle
-    last: Cycle
+    first: int
+    last: int
+    begin_s: float
+    end_s: float
 
     def __str__(self) -> str:
-        first, last = self.first, self.last
         return (
-            f"{first.stamp_ns / 1e9:.3f} s to {last.stamp_ns / 1e9:.3f} s of the drive, "
-            f"cycles {first.number} to {last.number}"
+            f"{self.begin_s:.3f} s to {self.end_s:.3f} s of its time, "
+            f"cycles {self.first} to {self.last}"
         )
 
 
@@ -66,26 +76,21 @@ def last_broadcast(log: Log) -> Cycle:
 
 
 def at_time(log: Log, at_s: float) -> Cycle:
-    """Find the last cycle whose view is at or before `at_s` of the drive. Raises UsageError."""
-    at_ns = round(at_s * 1e9)
-    covered = _covered(log)
-    if not covered.first.stamp_ns <= at_ns <= covered.last.stamp_ns:
-        raise UsageError(f"{log.path} covers {covered}: choose a time of these, not {at_s:g} s")
-
-    anchor = log.last(topics.COMPETITION.name, lambda message: message.stamp_ns <= at_ns)
-    found = covered.first
-    start_s = 0.0
-    if anchor is not None:
-        competition = anchor.message
-        assert isinstance(competition, Competition)
-        found = Cycle(competition.cycle, competition.stamp_ns)
-        start_s = anchor.time_s
-
-    # A cycle that ended at its deadline has deltas but no competition.
-    for cycle in _cycles(log, topics.DELTA, start_s=start_s):
-        if cycle.stamp_ns > at_ns:
+    """Find the newest cycle of which something was received by `at_s` into the log. Raises
+    UsageError.
+    """
+    found = None
+    back_s = BACK_S
+    while found is None and at_s <= log.duration_s:
+        recent = _cycles(log, *CYCLES, start_s=at_s - back_s, end_s=at_s + SHOWN_S)
+        found = max(recent, key=lambda cycle: cycle.number, default=None)
+        if back_s > at_s:
             break
-        found = max(found, cycle, key=lambda each: each.number)
+        back_s *= 2
+
+    if found is None:
+        covered = _covered(log)
+        raise UsageError(f"{log.path} covers {covered}: choose a time of these, not {at_s:g} s")
     return found
 
 
@@ -112,28 +117,33 @@ def _of_number(log: Log, number: int) -> Cycle | None:
 
 def _covered(log: Log) -> Covered:
     """Find the first and the last cycle of a log. Raises LogError if it holds none."""
-    first = next(_cycles(log, *CYCLES), None)
+    first = next(log.messages(*CYCLES), None)
     if first is None:
         names = " and no ".join(topic.name for topic in CYCLES)
         raise LogError(
             f"{log.path} holds no {names}: `cogmap log info {log.path}` shows what it holds"
         )
 
-    newest = first.number
+    oldest = _cycle_of(first.message).number
+    newest = oldest
     for topic in CYCLES:
-        entry = log.last(topic.name, lambda _message: True)
+        entry = log.last(topic, lambda _message: True)
         if entry is not None:
-            message = entry.message
-            assert isinstance(message, Delta | Competition)
-            newest = max(newest, message.cycle)
-    return Covered(first, _of_number(log, newest) or first)
+            newest = max(newest, _cycle_of(entry.message).number)
+    return Covered(oldest, newest, first.time_s, log.duration_s)
 
 
-def _cycles(log: Log, *wanted: Topic, start_s: float = 0.0) -> Iterator[Cycle]:
+def _cycles(
+    log: Log, *wanted: Topic, start_s: float = 0.0, end_s: float | None = None
+) -> Iterator[Cycle]:
     """Yield the cycle of each message but late answers, whose stamp is that of another cycle."""
-    for entry in log.messages(*[topic.name for topic in wanted], start_s=start_s):
+    for entry in log.messages(*wanted, start_s=start_s, end_s=end_s):
         message = entry.message
-        assert isinstance(message, Delta | Competition)
         if isinstance(message, Delta) and message.phase is Phase.LATE:
             continue
-        yield Cycle(message.cycle, message.stamp_ns)
+        yield _cycle_of(message)
+
+
+def _cycle_of(message: Message) -> Cycle:
+    assert isinstance(message, Delta | Competition)
+    return Cycle(message.cycle, message.stamp_ns)

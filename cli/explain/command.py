@@ -31,7 +31,7 @@ Examples:
     "at_s",
     type=FiniteRange(min=0),
     metavar="SECONDS",
-    help="Explain the cycle at this time of the drive.",
+    help="Explain the cycle at this time of the log, in seconds since its first message.",
 )
 @click.option(
     "--cycle",

@@ -25,6 +25,7 @@ def facts(moment: Moment) -> dict[str, Any]:
         "log": str(moment.path),
         "cycle": moment.cycle,
         "at_s": moment.at_s,
+        "driven_s": moment.driven_s,
         "stamp_ns": moment.stamp_ns,
     }
     for name in _IN_FULL:

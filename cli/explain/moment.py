@@ -41,9 +41,15 @@ class Moment:
     settings: Config
 
     @property
-    def at_s(self) -> float:
-        """Return when the view was taken, in seconds of simulated time."""
+    def driven_s(self) -> float:
+        """Return when the view was taken, in seconds of the drive."""
         return self.stamp_ns / 1e9
+
+    @property
+    def at_s(self) -> float:
+        """Return when the first message of the cycle was received, in seconds into the log."""
+        of_cycle = [*self.deltas, self.competition]
+        return min(logged.time_s for logged in of_cycle if logged is not None)
 
     @property
     def winner(self) -> str:

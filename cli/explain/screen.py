@@ -24,7 +24,7 @@ def print_moment(moment: Moment) -> None:
         console.width = PIPED_WIDTH
 
     title = Text(headline(moment), TITLE)
-    title.append(f"  {moment.path}", FAINT)
+    title.append(f"  {moment.at_s:.3f} s into {moment.path}", FAINT)
     console.print(title)
     console.print()
 

@@ -35,7 +35,7 @@ class Stage:
 
 def headline(moment: Moment) -> str:
     """Say which moment it is."""
-    return f"cycle {moment.cycle}, {moment.at_s:.3f} s into the drive"
+    return f"cycle {moment.cycle}, {moment.driven_s:.3f} s into the drive"
 
 
 def stages(moment: Moment) -> list[Stage]:

@@ -64,7 +64,7 @@ def _frame_options(command: _Command) -> _Command:
             "at_s",
             type=FiniteRange(min=0),
             metavar="SECONDS",
-            help="The frame nearest to this time of the log.",
+            help="The frame nearest to this time of the log, in seconds since its first message.",
         ),
         click.option(
             "--frame", type=click.IntRange(min=0), metavar="N", help="The frame with this number."

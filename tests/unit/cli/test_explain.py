@@ -47,7 +47,8 @@ def test_the_last_broadcast_of_the_reference_drive_is_explained() -> None:
 
     assert found["broadcast"]["message"]["cycle"] == found["cycle"]
     assert found["winner"] == found["broadcast"]["message"]["coalition"]["id"]
-    assert f"cycle {found['cycle']}, {found['at_s']:.3f} s into the drive" in shown
+    assert f"cycle {found['cycle']}, {found['driven_s']:.3f} s into the drive" in shown
+    assert f"{found['at_s']:.3f} s into {REFERENCE}" in shown
     for name in ("perceived", "workspace", "competition", "conscious", "action", "command"):
         assert f"\n{name}" in shown
 
@@ -97,7 +98,7 @@ def test_a_run_is_named_by_its_folder(drive: Path, tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--at", "60"], r"covers 0\.100 s to 0\.600 s of the drive, cycles 1 to 6: .* not 60 s"),
+        (["--at", "60"], r"covers 0\.010 s to 0\.560 s of its time, cycles 1 to 6: .* not 60 s"),
         (["--at", "0"], r"choose a time of these, not 0 s"),
         (["--cycle", "9"], r"cycles 1 to 6: choose one of these, not cycle 9"),
         (["--at", "0.2", "--cycle", "2"], r"--at and --cycle both name a moment: leave one out"),

@@ -8,15 +8,13 @@ from msgspec import structs
 
 from cogmap.cli.explain import choice
 from cogmap.cli.explain.moment import Moment, moment
-from cogmap.recording.log import open_log
+from cogmap.recording.log import Log, open_log
 from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Phase
 from cogmap.services.global_workspace.config import Config
 from tests.support.cycles import CYCLE_NS, MS_NS, Cycles, action, command, delta
 from tests.support.logs import Row, write_log
 from tests.support.reference import REFERENCE
-
-CYCLE_S = CYCLE_NS / 1e9
 
 
 def found(path: Path, number: int) -> Moment:
@@ -25,19 +23,25 @@ def found(path: Path, number: int) -> Moment:
     return moment(log, cycle.number, cycle.stamp_ns)
 
 
+def began_s(log: Log, cycle: int) -> float:
+    """When the first message of a cycle was received, in seconds into the log."""
+    number = choice.numbered(log, cycle)
+    return moment(log, number.number, number.stamp_ns).at_s
+
+
 def at(after_ms: int, cycle: int, message: Message) -> Row:
     return cycle * CYCLE_NS + after_ms * MS_NS, message
 
 
-def test_a_time_means_the_last_cycle_whose_view_is_not_later(tmp_path: Path) -> None:
+def test_a_time_of_the_log_means_the_newest_cycle_then(tmp_path: Path) -> None:
     cycles = Cycles()
     for cycle in range(1, 40):
         cycles.add(cycle, novelty=0.9)
     log = open_log(write_log(tmp_path / "drive.mcap", cycles.rows))
 
     for cycle in (1, 2, 17, 39):
-        assert choice.at_time(log, cycle * CYCLE_S).number == cycle
-    assert choice.at_time(log, 17.99 * CYCLE_S).number == 17
+        assert choice.at_time(log, began_s(log, cycle)).number == cycle
+    assert choice.at_time(log, began_s(log, 18) - 0.001).number == 17
     assert choice.numbered(log, 23).stamp_ns == 23 * CYCLE_NS
 
 
@@ -48,7 +52,7 @@ def test_a_cycle_that_ended_before_its_attention_is_found_too(tmp_path: Path) ->
     cycles.add(3, novelty=0.9)
     log = open_log(write_log(tmp_path / "drive.mcap", cycles.rows))
 
-    assert choice.at_time(log, 2 * CYCLE_S) == choice.numbered(log, 2)
+    assert choice.at_time(log, began_s(log, 2)) == choice.numbered(log, 2)
     assert moment(log, 2, 2 * CYCLE_NS).competition is None
 
 
@@ -60,8 +64,10 @@ def test_an_answer_that_came_late_does_not_stand_for_its_view(tmp_path: Path) ->
     cycles.rows.append(at(70, 2, late))
     log = open_log(write_log(tmp_path / "drive.mcap", cycles.rows))
 
-    assert choice.at_time(log, 1.5 * CYCLE_S).number == 1
-    assert choice.at_time(log, 2 * CYCLE_S).number == 2
+    found_then = choice.at_time(log, log.duration_s)
+
+    assert found_then.number == 2
+    assert found_then.stamp_ns == 2 * CYCLE_NS
 
 
 def test_a_winner_that_had_waited_is_traced_to_the_cycle_in_which_it_entered(
