@@ -2,32 +2,38 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Iterable
 
 from cogmap.errors import UsageError
+from cogmap.hints import did_you_mean
 from cogmap.recording.storage.format import topics_to_record
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Topic
 
 
 def named(names: Iterable[str | Topic]) -> list[Topic]:
-    """Return the topics of those names; a topic stands for itself. Raises UsageError naming the one
-    that is not in the table.
+    """Return the topics of those names; a topic stands for itself. Raises UsageError as `one`."""
+    return [one(name) for name in names]
+
+
+def one(name: str | Topic) -> Topic:
+    """Return the topic called `name`, which may begin with a slash; a topic stands for itself.
+
+    Raises UsageError naming what may be meant if it is not in the table.
     """
-    found = []
-    for name in names:
-        if isinstance(name, Topic):
-            found.append(name)
-            continue
-        if name not in topics.BY_NAME:
-            close = difflib.get_close_matches(name, topics.BY_NAME, 1)
-            known = f"there are {', '.join(sorted(topics.BY_NAME))}"
-            raise UsageError(
-                f"no topic {name!r}: {f'did you mean {close[0]}?' if close else known}"
-            )
-        found.append(topics.BY_NAME[name])
+    if isinstance(name, Topic):
+        return name
+    if not isinstance(name, str):
+        raise UsageError(
+            f"{name!r} is no topic: give each as an argument of its own, by its name or as a "
+            "constant of `cogmap.topics`"
+        )
+
+    found = topics.BY_NAME.get(name.strip("/"))
+    if found is None:
+        known = f"there are {', '.join(sorted(topics.BY_NAME))}"
+        raise UsageError(f"no topic {name!r}: {did_you_mean(name, topics.BY_NAME, known)}")
     return found
 
 

@@ -142,7 +142,7 @@ def test_recover_prints_what_it_saved_and_what_is_lost(path: Path, tmp_path: Pat
     ("arguments", "sentence"),
     [
         (["info", "absent.mcap"], "no log absent.mcap"),
-        (["cat", "LOG", "odometer"], "did you mean odometry"),
+        (["cat", "LOG", "odometer"], "did you mean 'odometry'"),
         (["replay", "LOG", "--into", "cerebellum"], "no module 'cerebellum'"),
         (
             ["replay", "LOG", "--into", "action"],

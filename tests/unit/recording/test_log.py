@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from msgspec import structs
@@ -107,8 +108,22 @@ def test_a_log_that_lacks_a_delta_gives_no_graph_after_it(tmp_path: Path) -> Non
 def test_an_unknown_topic_is_named(path: Path) -> None:
     log = open_log(path)
 
-    with pytest.raises(UsageError, match="did you mean odometry"):
+    with pytest.raises(UsageError, match="did you mean 'odometry'"):
         list(log.messages("odometri"))
+
+
+def test_messages_can_be_chosen_by_a_constant_of_the_table(path: Path) -> None:
+    with open_log(path) as log:
+        by_constant = [entry.log_time_ns for entry in log.messages(topics.ODOMETRY)]
+        by_name = [entry.log_time_ns for entry in log.messages("odometry")]
+
+    assert by_constant == by_name
+
+
+@pytest.mark.parametrize("wrong", [["odometry"], Odometry])
+def test_what_is_no_topic_is_refused_in_a_sentence(path: Path, wrong: Any) -> None:
+    with open_log(path) as log, pytest.raises(UsageError, match="is no topic: give each"):
+        list(log.messages(wrong))
 
 
 def test_a_message_that_does_not_fit_its_topic_is_named(tmp_path: Path) -> None:

@@ -88,7 +88,7 @@ def test_messages_can_be_chosen_by_the_constant_of_their_topic(tmp_path: Path) -
 def test_a_frame_of_an_unknown_topic_is_refused_with_one_that_is_meant(tmp_path: Path) -> None:
     log = open_log(write(tmp_path, odometry(0)))
 
-    with pytest.raises(UsageError, match="did you mean odometry"):
+    with pytest.raises(UsageError, match="did you mean 'odometry'"):
         log.frame("odometri")
 
 

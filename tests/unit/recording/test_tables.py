@@ -89,5 +89,5 @@ def test_without_a_format_and_without_a_log_the_remedy_is_named(tmp_path: Path) 
         exported(REFERENCE)
     with pytest.raises(LogError, match="no log"):
         exported(tmp_path / "none.mcap", "--csv", tmp_path / "out")
-    with pytest.raises(UsageError, match="did you mean odometry"):
+    with pytest.raises(UsageError, match="did you mean 'odometry'"):
         exported(REFERENCE, "odometri", "--csv", tmp_path / "out")

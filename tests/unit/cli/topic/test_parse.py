@@ -7,12 +7,13 @@ import json
 import pytest
 from click.testing import CliRunner
 
-from cogmap.cli.topic.argument import streamed_topic, topic_named
+from cogmap.cli.topic.argument import streamed_topic
 from cogmap.cli.topic.documents import documents
 from cogmap.cli.topic.echo import formatter
 from cogmap.cli.topic.parse import parse, pattern
 from cogmap.cli.topic.pub import pub
 from cogmap.errors import UsageError
+from cogmap.recording.selection import one
 from cogmap.schemas import topics
 from cogmap.schemas.examples import example_messages
 from cogmap.schemas.sensing import MotorCommand, Odometry
@@ -78,11 +79,11 @@ def test_an_array_whose_data_do_not_fit_its_shape_is_refused() -> None:
 
 
 def test_a_topic_may_begin_with_a_slash_and_a_wrong_one_names_the_nearest() -> None:
-    assert topic_named("/odometry") is topics.ODOMETRY
-    assert topic_named("odometry") is topics.ODOMETRY
+    assert one("/odometry") is topics.ODOMETRY
+    assert one("odometry") is topics.ODOMETRY
 
     with pytest.raises(UsageError, match=r"no topic 'odometri': did you mean 'odometry'\?"):
-        topic_named("odometri")
+        one("odometri")
 
 
 def test_what_is_answered_on_request_cannot_be_watched() -> None:
