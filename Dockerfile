@@ -18,4 +18,6 @@ RUN /opt/cogmap/venv/bin/pip install --no-cache-dir --no-deps --no-build-isolati
 ENV PATH=/opt/cogmap/venv/bin:$PATH PYTHONUNBUFFERED=1
 USER cogmap
 WORKDIR /var/lib/cogmap
+# The map of a drive is drawn with these fonts: each container would look for them anew, and say so.
+RUN python -c 'import matplotlib.font_manager'
 ENTRYPOINT ["cogmap"]

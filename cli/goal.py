@@ -29,7 +29,10 @@ FARTHEST_M = 1e6
 
 
 class Person:
-    """Offers goals once it has the graph, and waits for the plan that has them all."""
+    """Offers goals once it has the graph, and waits for the plan that has them all.
+
+    A goal that is not on the map, but like a name that is, was misspelt: it is withdrawn.
+    """
 
     def __init__(self, goals: Sequence[Goal], clears: bool) -> None:
         self.graph = Graph()
@@ -56,11 +59,16 @@ class Person:
             return published
 
         plan = self._plan_of(delta)
-        if plan is not None:
-            self.plan = plan
-            self.has_plan.set()
+        if plan is None:
+            return published
 
-        return published
+        self.plan = plan
+        self.has_plan.set()
+        misspelt = misspellings(plan, self.graph)
+        withdrawn = [DropNode(id=goal.id) for goal in self._goals if goal.id in misspelt]
+        if not withdrawn:
+            return []
+        return [Offer(cycle=self.graph.cycle, operations=[*withdrawn])]
 
     def _offer(self) -> list[Message]:
         if self._offered_version is not None:
@@ -102,6 +110,16 @@ class Person:
         return plan
 
 
+def misspellings(plan: Plan, graph: Graph) -> dict[str, str]:
+    """Find the goals of a plan that are not on the map, by id, each with the name like it."""
+    found = {}
+    for goal, state in plan.unreachable.items():
+        meant = nearest_label(goal, state, graph)
+        if meant:
+            found[goal] = meant
+    return found
+
+
 # Without this, a position's minus sign begins an option.
 @click.command(context_settings={"ignore_unknown_options": True})
 @click.argument("places", nargs=-1, metavar="[NAME | X Y]...")
@@ -132,7 +150,8 @@ def goal(
 
     A goal is the name of an object on its map, or a position X Y in metres on the map: the origin
     is where the agent started, X is ahead of it there, and Y to the left. The agent plans the order
-    of several goals itself. Prints the plan; ends with 1 if no route leads to a goal.
+    of several goals itself. Prints the plan; ends with 1 if no route leads to a goal. A name that
+    is not on the map, but like one that is, is withdrawn.
 
     \b
     cogmap goal bakery
@@ -230,12 +249,7 @@ def plan_json(plan: Plan, graph: Graph, reached: Iterable[str] = ()) -> bytes:
     """Encode the plan as JSON, with the goals reached before they were planned, and what may have
     been meant by goals that are not on the map.
     """
-    nearest = {}
-    for goal, state in plan.unreachable.items():
-        label = nearest_label(goal, state, graph)
-        if label:
-            nearest[name_of(goal)] = label
-
+    nearest = {name_of(goal): meant for goal, meant in misspellings(plan, graph).items()}
     summary = {
         "state": plan.state,
         "goals": [name_of(goal) for goal in plan.goals],

@@ -40,6 +40,7 @@ def measure(setting: Setting) -> Metrics:
     announce = setting.announce
     announce("driving one lap in real time")
     driven, _ = drive(folder)
+    assert driven.error_ratio is not None, "a lap is driven, with noise of the wheels"
 
     announce(f"driving with {ten_hertz.FRAME_HZ} camera frames a second")
     at_ten_hertz = ten_hertz.measure(folder / "ten_hertz")

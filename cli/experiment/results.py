@@ -6,10 +6,12 @@ import json
 import shlex
 import sys
 from collections.abc import Mapping
+from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
 from rich.console import Console
 from rich.table import Table
 
@@ -26,7 +28,9 @@ KINDS = ("png", "pdf")
 
 
 def folder_for(name: str, out: Path | None) -> Path:
-    """Make `out`, or the folder runs/`name`, if it is missing. Raises UsageError if that fails."""
+    """Make `out`, or the folder runs/`name`, if it is missing. It is gone again when the command
+    has ended, if nothing was written there. Raises UsageError if it cannot be made.
+    """
     folder = out if out is not None else Path("runs") / name
 
     try:
@@ -36,7 +40,13 @@ def folder_for(name: str, out: Path | None) -> Path:
             f"cannot make the folder {folder} ({error.strerror}): name another with --out"
         ) from None
 
+    click.get_current_context().call_on_close(lambda: _remove_empty(folder))
     return folder
+
+
+def _remove_empty(folder: Path) -> None:
+    with suppress(OSError):  # it is not empty, and stays
+        folder.rmdir()
 
 
 def command_line() -> str:

@@ -52,10 +52,25 @@ def _waiting_line(names: list[str]) -> str:
     return f"waiting for {', '.join(names)}" if names else "starting"
 
 
+class Furthest:
+    """The largest share of a drive that was done: goals that are given late add to what is left,
+    and a new route may be longer, which is no step back.
+    """
+
+    def __init__(self) -> None:
+        self._share = 0.0
+
+    def share(self, observer: Observer) -> float:
+        """Return it, with what is done by now."""
+        self._share = max(self._share, observer.progress)
+        return self._share
+
+
 class LiveDisplay:
     """A progress bar and a line that change in place."""
 
     def __init__(self, console: Console) -> None:
+        self._furthest = Furthest()
         self._progress = Progress(
             BarColumn(bar_width=None),
             TaskProgressColumn(),
@@ -74,7 +89,9 @@ class LiveDisplay:
 
     def driving(self, observer: Observer, errors: Errors) -> None:
         line = _drive_line(observer, errors)
-        self._progress.update(self._task, completed=observer.progress, description=line)
+        self._progress.update(
+            self._task, completed=self._furthest.share(observer), description=line
+        )
 
     def close(self) -> None:
         self._progress.stop()
@@ -85,6 +102,7 @@ class PlainDisplay:
 
     def __init__(self, console: Console) -> None:
         self._console = console
+        self._furthest = Furthest()
         self._next_s = 0.0
 
     def show(self, sentence: str) -> None:
@@ -95,7 +113,8 @@ class PlainDisplay:
             self._show_periodically(_waiting_line(names))
 
     def driving(self, observer: Observer, errors: Errors) -> None:
-        self._show_periodically(f"{observer.progress:4.0%}  {_drive_line(observer, errors)}")
+        share = self._furthest.share(observer)
+        self._show_periodically(f"{share:4.0%}  {_drive_line(observer, errors)}")
 
     def _show_periodically(self, line: str) -> None:
         now_s = time.monotonic()

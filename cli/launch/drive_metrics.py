@@ -87,7 +87,8 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     `estimate` has the errors of the estimated position, `wheels_alone` and `fused_alone` those of
     path integration alone: of the wheels' odometry, and of the self-motion that sensory memory
     fuses of wheels and views. `error_ratio` is the estimate's mean error over that of the wheels,
-    `error_over_fused` over that of fused self-motion. `cycle_*_ms`: camera frame stamped to motor
+    `error_over_fused` over that of fused self-motion; None where these do not err, as of a robot
+    that never moved. `cycle_*_ms`: camera frame stamped to motor
     command received; `bus_share`: the part of the mean spent in anything but computing. `halted`
     and `slowed` count the commands that stopped the robot or kept it below cruising, by reason.
     `dropped` answers of codelets are in no delta; `refused` gives the reasons of the last few.
@@ -110,8 +111,8 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
     estimate: ErrorMetrics
     wheels_alone: ErrorMetrics
     fused_alone: ErrorMetrics
-    error_ratio: float
-    error_over_fused: float
+    error_ratio: float | None
+    error_over_fused: float | None
     estimates: int
     commands: int
     broadcasts: int

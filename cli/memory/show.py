@@ -8,16 +8,32 @@ from pathlib import Path
 
 import click
 import msgspec
+from mcap.writer import MCAP0_MAGIC
 
 from cogmap.cli.options import json_option
 from cogmap.cli.printing import megabytes, print_json, print_table
 from cogmap.cli.progress import bar
+from cogmap.errors import UsageError
 from cogmap.runtime.state.database import Database
 from cogmap.runtime.state.record import Record
 
 COLUMNS = ["kind:", "records", "size", "newest:"]
 existing_file = click.Path(exists=True, dir_okay=False, path_type=Path)
-database_argument = click.argument("path", metavar="FILE", type=existing_file)
+
+
+def _database(context: click.Context, argument: click.Parameter, path: Path) -> Path:
+    """Refuse a log, which nobody should move away to make a memory in its place."""
+    with path.open("rb") as file:
+        is_log = file.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
+    if is_log:
+        raise UsageError(
+            f"{path} is a log, not a memory: `cogmap log info {path}` shows it, and the memory of "
+            "a run is memory.db in its folder"
+        )
+    return path
+
+
+database_argument = click.argument("path", metavar="FILE", type=existing_file, callback=_database)
 
 
 @contextmanager

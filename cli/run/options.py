@@ -37,7 +37,8 @@ town_option = click.option(
 tour_option = click.option(
     "--tour",
     is_flag=True,
-    help="A tour of a town of blocks: explore it, drive to three goals, avoid a closed street.",
+    help="A tour of the town, one of blocks unless --town names another: explore it, drive to "
+    "three goals, avoid a closed street.",
 )
 goals_option = click.option(
     "--goals",

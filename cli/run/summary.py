@@ -99,18 +99,15 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         sentences = [escape(f"{name}: {reason}") for name, reason in metrics.unreached.items()]
         rows.append(("not reached", _first(sentences, "\n")))
 
-    ratios = f"{metrics.error_over_fused:.3f} over fused self-motion"
-    if metrics.wheels_alone.is_measured:
-        ratios = f"{ratios}, {metrics.error_ratio:.3f} over wheels"
-    if not metrics.estimate.is_measured:
-        ratios = "not measured"
+    over = {"fused self-motion": metrics.error_over_fused, "wheels": metrics.error_ratio}
+    ratios = [f"{ratio:.3f} over {name}" for name, ratio in over.items() if ratio is not None]
     limits = Counter(metrics.halted) + Counter(metrics.slowed)
     shares = [f"{name} {number / metrics.commands:.0%}" for name, number in limits.most_common()]
     rows += [
         ("position error", _errors(metrics.estimate)),
         ("path integration alone, fused self-motion", _errors(metrics.fused_alone)),
         ("path integration alone, wheels", _errors(metrics.wheels_alone)),
-        ("error ratio", ratios),
+        ("error ratio", ", ".join(ratios) or "not measured"),
         ("buildings", headline(metrics)),
         ("learned", f"{metrics.road_m2:.0f} m² of street"),
         ("forgotten", _first(metrics.forgotten, ", ") or "nothing"),

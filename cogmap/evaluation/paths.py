@@ -49,21 +49,23 @@ class Errors:
     fused_rad: Floats
 
     @property
-    def over_wheels(self) -> float:
-        """Return the mean error of the estimate over the wheels' alone; 1 if there is neither."""
+    def over_wheels(self) -> float | None:
+        """Return the mean error of the estimate over the wheels' alone; None if these have none,
+        as of a robot that never moved.
+        """
         return _ratio(self.estimate_m, self.wheels_m)
 
     @property
-    def over_fused(self) -> float:
-        """Return the mean error of the estimate over fused self-motion's alone; 1 if there is
-        neither.
+    def over_fused(self) -> float | None:
+        """Return the mean error of the estimate over fused self-motion's alone; None if that has
+        none.
         """
         return _ratio(self.estimate_m, self.fused_m)
 
 
-def _ratio(errors_m: Floats, baseline_m: Floats) -> float:
+def _ratio(errors_m: Floats, baseline_m: Floats) -> float | None:
     if not baseline_m.any():
-        return 1.0
+        return None
     return float(errors_m.mean() / baseline_m.mean())
 
 

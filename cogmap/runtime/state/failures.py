@@ -43,7 +43,7 @@ def named(path: Path) -> Iterator[None]:
             ) from None
         if code == sqlite3.SQLITE_NOTADB:
             raise StorageError(
-                f"{path} is no SQLite database: move it away to start anew, or name another file"
+                f"{path} is no SQLite database: name another file, or move it away to start anew"
             ) from None
         raise damaged(path, str(error)) from None
 

@@ -8,7 +8,7 @@ import msgspec
 import pytest
 from click.testing import CliRunner
 
-from cogmap.cli.goal import goal, parsed, plan_json, plan_text, read_goals
+from cogmap.cli.goal import goal, misspellings, parsed, plan_json, plan_text, read_goals
 from cogmap.errors import UsageError
 from cogmap.schemas.nodes import PLAN_ID, Plan, PlanState, goal_id
 from cogmap.testing import graph_of, landmark
@@ -98,3 +98,18 @@ def test_for_a_goal_that_is_not_on_the_map_the_nearest_object_is_suggested() -> 
     assert text == "bakry: the map has no object of that name: did you mean 'bakery'?"
     assert summary["unreachable"] == {"bakry": unknown.value}
     assert summary["nearest"] == {"bakry": "bakery"}
+
+
+def test_a_misspelt_goal_is_found_with_the_name_that_is_meant() -> None:
+    plan = Plan(
+        id=PLAN_ID,
+        state=PlanState.UNKNOWN_GOAL,
+        unreachable={
+            goal_id("bakry"): PlanState.UNKNOWN_GOAL,
+            goal_id("harbour"): PlanState.UNKNOWN_GOAL,
+            goal_id("bakery"): PlanState.BLOCKED,
+        },
+    )
+    graph = graph_of(landmark("41a", [(3.0, 4.0)], names={"bakery": 5.0}), plan)
+
+    assert misspellings(plan, graph) == {goal_id("bakry"): "bakery"}

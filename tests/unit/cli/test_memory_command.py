@@ -11,9 +11,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from cogmap.cli.main import cogmap, main
-from cogmap.errors import StorageError
+from cogmap.errors import StorageError, UsageError
 from cogmap.runtime.state.database import Database
 from cogmap.runtime.state.record import Record, digest_of
+from tests.support.reference import REFERENCE
 
 OLD = Record("scene-1", "scene", b"\x00\xff" * 500)
 EVENT = Record("event-1", "event", b"")
@@ -175,3 +176,8 @@ def test_a_check_ends_with_2_and_a_sentence_where_something_is(
 
     assert ended.value.code == 2
     assert capsys.readouterr().err.startswith(f"cogmap: {path} is damaged (")
+
+
+def test_a_log_is_no_memory_and_stays_where_it_is() -> None:
+    with pytest.raises(UsageError, match=r"reference.mcap is a log, .*`cogmap log info"):
+        memory_command("show", REFERENCE)

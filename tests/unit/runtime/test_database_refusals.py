@@ -83,7 +83,7 @@ def test_a_file_that_is_no_database_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "memory.db"
     path.write_text("remember the milk\n" * 500)
 
-    refuse(path, r"memory\.db is no SQLite database: move it away")
+    refuse(path, r"memory\.db is no SQLite database: name another")
 
 
 def test_a_database_cut_short_anywhere_is_refused(path: Path) -> None:

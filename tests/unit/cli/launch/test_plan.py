@@ -256,3 +256,11 @@ def test_toml_keeps_every_character_and_infinity() -> None:
     read = tomllib.loads(to_toml(sections))
 
     assert read == sections
+
+
+@pytest.mark.parametrize("town", ["loop", "blocks"])
+def test_a_tour_is_of_the_town_that_is_chosen(town: str) -> None:
+    sections = configured(Choices(tour=True, town=town))
+
+    assert sections["sim"]["town"] == town
+    assert "goals" not in sections["workspace"] or not sections["workspace"]["goals"]
