@@ -23,8 +23,9 @@ def to_jsonable(message: Any, full: bool = False) -> Any:
     return _plain(message, lambda array: _array(array, full))
 
 
-def to_text(message: Any, full: bool = False) -> str:
-    """Return `message`, or a part of one, as YAML without a line break at its end.
+def to_text(message: Any, full: bool = False, *, flow: bool = False) -> str:
+    """Return `message`, or a part of one, as YAML without a line break at its end, on one line if
+    it is to `flow`.
 
     An array becomes one line: its dtype, shape, minimum and maximum; with `full`, its dtype, shape
     and all values.
@@ -43,10 +44,11 @@ def to_text(message: Any, full: bool = False) -> str:
         _plain(message, line),
         Dumper=yaml.CSafeDumper,
         sort_keys=False,
+        default_flow_style=flow,
         allow_unicode=True,
         width=ONE_LINE,
     )
-    return text.removesuffix("...\n").rstrip("\n")
+    return text.removesuffix("\n...\n").rstrip("\n")
 
 
 def field(message: Any, path: str) -> Any:
@@ -58,7 +60,7 @@ def field(message: Any, path: str) -> Any:
     for step in path.split("."):
         is_array = isinstance(value, Array | Matrix)
         if isinstance(value, msgspec.Struct | dict) and not is_array:
-            fields = _fields(value) if isinstance(value, msgspec.Struct) else value
+            fields = fields_of(value) if isinstance(value, msgspec.Struct) else value
             if step not in fields:
                 names = ", ".join(map(str, fields)) or "no fields"
                 raise LookupError(f"no {step!r} on the way to {path!r}: there are {names}")
@@ -89,7 +91,7 @@ def _plain(value: Any, of_array: Callable[[Array | Matrix], Any]) -> Any:
     if isinstance(value, enum.Enum):
         return value.value
     if isinstance(value, msgspec.Struct):
-        value = _fields(value)
+        value = fields_of(value)
 
     if isinstance(value, dict):
         return {str(name): _plain(part, of_array) for name, part in value.items()}
@@ -98,7 +100,8 @@ def _plain(value: Any, of_array: Callable[[Array | Matrix], Any]) -> Any:
     return value
 
 
-def _fields(struct: msgspec.Struct) -> dict[str, Any]:
+def fields_of(struct: msgspec.Struct) -> dict[str, Any]:
+    """Return the fields of `struct` by name, its tag first; those that are unset are left out."""
     config = struct.__struct_config__
     fields = {}
     if config.tag is not None:

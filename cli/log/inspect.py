@@ -11,21 +11,25 @@ import click
 import msgspec
 
 from cogmap.cli.log import report
+from cogmap.cli.messages.condition import ALWAYS, Condition, filter_option, parsed
+from cogmap.cli.messages.style import Form, Style, style_options
 from cogmap.cli.options import FiniteRange, json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.progress import bar
-from cogmap.errors import MessageError
+from cogmap.errors import MessageError, UsageError
 from cogmap.recording import diff as differ
 from cogmap.recording import info as informer
 from cogmap.recording import selection
 from cogmap.recording.storage import recover as rescuer
 from cogmap.recording.storage.reader import LogReader, Record
-from cogmap.schemas.render import to_jsonable, to_text
+from cogmap.schemas.render import to_jsonable
 
 _CAT_EPILOG = """\b
 Examples:
   cogmap log cat drive.mcap action/selected
   cogmap log cat drive.mcap odometry -n 3
+  cogmap log cat drive.mcap motor/command --filter "halted_by == obstacle"
+  cogmap log cat drive.mcap truth/pose --field pose.x_m --field pose.y_m --csv
   cogmap log cat drive.mcap --json --full sensory/scan | jq .message.range_m
 """
 _DIFF_EPILOG = """\b
@@ -59,33 +63,32 @@ def info(log: Path, as_json: bool) -> None:
     default=0.0,
     help="Begin this many seconds after the start of the log.",
 )
-@click.option("--full", is_flag=True, help="Print all values of arrays.")
-@json_option
+@filter_option
+@style_options
 def cat(
     log: Path,
     topics: tuple[str, ...],
     number: int | None,
     start_offset: float,
-    full: bool,
-    as_json: bool,
+    condition: str | None,
+    style: Style,
 ) -> None:
-    """Print the messages in LOG, of all topics or of TOPICS; with --json, one per line."""
+    """Print the messages in LOG, of all topics or of TOPICS, as `cogmap topic echo` does.
+
+    With --json each has its topic, time and envelope beside it.
+    """
+    chosen = selection.named(topics)
+    if (condition is not None or style.fields) and len(chosen) != 1:
+        raise UsageError("--filter and --field are for the messages of one topic: name it")
+    wanted = parsed(condition, chosen[0]) if condition is not None else ALWAYS
+
     reader = LogReader(log)
     start_ns = reader.span_ns[0] + int(start_offset * 1e9)
-    chosen = reader.records(selection.named(topics) or None)
-    later = (record for record in chosen if record.log_time_ns >= start_ns)
-    for record in islice(later, number):
-        if as_json:
-            facts: dict[str, Any] = {"topic": record.topic_name, "log_time_ns": record.log_time_ns}
-            if record.envelope is not None:
-                facts["envelope"] = to_jsonable(record.envelope)
-            try:
-                facts["message"] = to_jsonable(reader.message(record), full)
-            except MessageError as error:
-                facts["error"] = str(error)
-            click.echo(msgspec.json.encode(facts).decode())
-        else:
-            click.echo(_as_text(reader, record, full))
+    records = reader.records(chosen or None, start_ns=start_ns)
+    meant = (record for record in records if _is_meant(reader, record, wanted))
+    for record in islice(meant, number):
+        write = _as_json if style.form is Form.JSON else _as_text
+        click.echo(write(reader, record, style))
 
 
 @click.command(epilog=_DIFF_EPILOG)
@@ -123,10 +126,36 @@ def recover(source: Path, target: Path, as_json: bool) -> None:
         report.print_recovery(recovery)
 
 
-def _as_text(reader: LogReader, record: Record, full: bool) -> str:
-    at_s = (record.log_time_ns - reader.span_ns[0]) / 1e9
-    head = f"--- {record.topic_name} at {at_s:.3f} s"
+def _is_meant(reader: LogReader, record: Record, wanted: Condition) -> bool:
+    """Decide whether a message is to be printed: one that cannot be read is, unless --filter asks
+    for its values.
+    """
+    if wanted is ALWAYS:
+        return True
     try:
-        return f"{head}\n{to_text(reader.message(record), full)}"
+        return wanted.holds(reader.message(record))
+    except MessageError:
+        return False
+
+
+def _as_json(reader: LogReader, record: Record, style: Style) -> str:
+    facts: dict[str, Any] = {"topic": record.topic_name, "log_time_ns": record.log_time_ns}
+    if record.envelope is not None:
+        facts["envelope"] = to_jsonable(record.envelope)
+    try:
+        facts["message"] = style.jsonable(reader.message(record))
     except MessageError as error:
-        return f"{head}\n# {error}"
+        facts["error"] = str(error)
+    return msgspec.json.encode(facts).decode()
+
+
+def _as_text(reader: LogReader, record: Record, style: Style) -> str:
+    try:
+        text = style.text(reader.message(record), reader.payload(record))
+    except MessageError as error:
+        text = f"# {error}"
+
+    if style.form not in (Form.TEXT, Form.FLOW):
+        return text
+    at_s = (record.log_time_ns - reader.span_ns[0]) / 1e9
+    return f"--- {record.topic_name} at {at_s:.3f} s\n{text}"

@@ -121,6 +121,17 @@ def test_echo_prints_so_many_messages_and_ends(robot: Robot, endpoint: str) -> N
     assert [message["speed_m_s"] for message in messages] == [1.5, 1.5, 1.5]
 
 
+def test_echo_prints_what_is_asked_for_or_says_that_nothing_came(
+    robot: Robot, endpoint: str
+) -> None:
+    words = ("topic", "echo", "odometry", "--once", "--flow-style", "--field", "speed_m_s")
+    output, _ = printed(endpoint, *words, "--filter", "speed_m_s > 1 and source == sim")
+    _, errors = printed(endpoint, *words, "--filter", "speed_m_s > 2", "--timeout", "0.5", code=1)
+
+    assert output == "1.5\n---\n"
+    assert "no message of odometry to print in 0.5 s" in errors
+
+
 @pytest.mark.parametrize(
     ("command", "metric"),
     [("hz", "average rate: "), ("bw", "/s from "), ("delay", "average delay: ")],

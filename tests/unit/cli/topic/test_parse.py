@@ -1,4 +1,4 @@
-"""Messages as a user writes them on the command line, and as `echo` shows them."""
+"""Messages as a user writes them on the command line."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ import json
 import pytest
 from click.testing import CliRunner
 
+from cogmap.cli.messages.style import Form, Style
 from cogmap.cli.topic.argument import streamed_topic
 from cogmap.cli.topic.documents import documents
-from cogmap.cli.topic.echo import formatter
 from cogmap.cli.topic.parse import parse, pattern
 from cogmap.cli.topic.pub import pub
 from cogmap.errors import UsageError
 from cogmap.recording.selection import one
 from cogmap.schemas import topics
 from cogmap.schemas.examples import example_messages
-from cogmap.schemas.sensing import MotorCommand, Odometry
+from cogmap.schemas.sensing import MotorCommand
 from cogmap.schemas.topics import Topic
 
 BY_TOPIC = {topics.of(message): message for message in example_messages()}
-ODOMETRY = Odometry(speed_m_s=1.5, turn_rate_rad_s=0.0, dt_s=0.05, stamp_ns=7, seq=3, source="sim")
 
 
 def test_a_message_is_read_from_json() -> None:
@@ -32,7 +31,7 @@ def test_a_message_is_read_from_json() -> None:
 @pytest.mark.parametrize("topic", topics.ALL, ids=lambda topic: topic.name)
 def test_what_echo_prints_in_full_can_be_published_again(topic: Topic) -> None:
     example = BY_TOPIC[topic]
-    printed = formatter((), True, False, "json")(example)
+    printed = Style(form=Form.JSON, full=True).text(example, b"")
 
     assert parse(topic, printed) == example
 
@@ -62,7 +61,7 @@ def test_a_wrong_field_is_named_with_what_was_expected(written: str, sentence: s
 
 
 def test_a_wrong_field_deep_inside_is_named_with_its_place() -> None:
-    plain = json.loads(formatter((), True, False, "json")(BY_TOPIC[topics.PERCEPTS]))
+    plain = json.loads(Style(form=Form.JSON, full=True).text(BY_TOPIC[topics.PERCEPTS], b""))
     plain["objects"][0]["labell"] = "x"
 
     with pytest.raises(
@@ -89,36 +88,6 @@ def test_a_topic_may_begin_with_a_slash_and_a_wrong_one_names_the_nearest() -> N
 def test_what_is_answered_on_request_cannot_be_watched() -> None:
     with pytest.raises(UsageError, match="answered on request"):
         streamed_topic("workspace/snapshot")
-
-
-def test_echo_shows_one_field_or_names_those_that_there_are() -> None:
-    speed = formatter(("speed_m_s",), False, False, "text")
-    assert speed(ODOMETRY) == "1.5\n---"
-
-    unknown = formatter(("speed",), False, False, "text")
-    with pytest.raises(UsageError, match=r"--field speed: no 'speed' .*speed_m_s"):
-        unknown(ODOMETRY)
-
-
-def test_echo_shows_every_field_that_is_named() -> None:
-    fields = ("dt_s", "speed_m_s")
-
-    assert formatter(fields, False, False, "text")(ODOMETRY) == "dt_s: 0.05\nspeed_m_s: 1.5\n---"
-    assert formatter(fields, False, False, "csv")(ODOMETRY) == "0.05,1.5"
-    as_json = formatter(fields, False, False, "json")(ODOMETRY)
-    assert json.loads(as_json) == {"dt_s": 0.05, "speed_m_s": 1.5}
-
-
-def test_echo_prints_a_line_of_csv_a_message() -> None:
-    as_csv = formatter((), False, False, "csv")
-
-    assert as_csv(ODOMETRY) == "7,3,sim,1.5,0.0,0.05"
-
-
-def test_echo_leaves_the_numbers_of_arrays_out_where_asked() -> None:
-    assert "motions: '<array type: <f8[4, 3]>'" in formatter((), False, True, "text")(
-        BY_TOPIC[topics.SELF_MOTION]
-    )
 
 
 def test_a_message_may_be_written_as_yaml_as_for_ros2_topic_pub() -> None:
