@@ -87,11 +87,15 @@ def type_(topic: Topic) -> None:
 
 @click.command()
 @click.argument("type_name", metavar="TYPE")
-def find(type_name: str) -> None:
+@click.option("-c", "--count-topics", is_flag=True, help="Print only how many there are.")
+def find(type_name: str, count_topics: bool) -> None:
     """List the topics whose messages are of TYPE."""
-    for topic in topics.ALL:
-        if topic.type.__name__.lower() == type_name.lower():
-            click.echo(topic.name)
+    found = [topic for topic in topics.ALL if topic.type.__name__.lower() == type_name.lower()]
+    if count_topics:
+        click.echo(len(found))
+        return
+    for topic in found:
+        click.echo(topic.name)
 
 
 def counts(system: System, role: Role) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
 
@@ -11,7 +11,7 @@ import zenoh
 
 from cogmap.bus.codec import Envelope
 from cogmap.bus.discovery import System, discover
-from cogmap.bus.interface import Arrival, Member
+from cogmap.bus.interface import Arrival, Bus, Member
 from cogmap.bus.session import CONNECT_TIMEOUT_S, open_client
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import NoRouterError
@@ -22,32 +22,40 @@ CLI = "cli"
 
 
 class Reception:
-    """Size, envelope and time of one arrival, without its payload."""
+    """Topic, size, envelope and time of one arrival, without its payload."""
 
-    __slots__ = ("envelope", "received_ns", "size_bytes")
+    __slots__ = ("envelope", "received_ns", "size_bytes", "topic")
 
     def __init__(self, arrival: Arrival) -> None:
+        self.topic = arrival.topic
         self.size_bytes = len(arrival.payload)
         self.envelope: Envelope | None = arrival.envelope
         self.received_ns = arrival.received_ns
 
 
 class Receptions:
-    """Every arrival on a topic, in order."""
+    """Every arrival on some topics for which `counts` is true, in order."""
 
-    def __init__(self, bus: ZenohBus, topic: Topic) -> None:
-        self._queue: SimpleQueue[Reception] = SimpleQueue()
-        bus.subscribe(topic, self._put, lambda name, number: None)
-
-    def _put(self, arrival: Arrival) -> None:
-        self._queue.put(Reception(arrival))
+    def __init__(
+        self,
+        bus: Bus,
+        watched: Iterable[Topic],
+        counts: Callable[[Arrival], bool] = lambda arrival: True,
+    ) -> None:
+        self._queue: SimpleQueue[Arrival] = SimpleQueue()
+        self._counts = counts
+        for topic in watched:
+            bus.subscribe(topic, self._queue.put, lambda name, number: None)
 
     def take(self, timeout_s: float) -> Reception | None:
-        """Take the next one; None if there is none within `timeout_s`."""
+        """Take the next one; None if there is none within `timeout_s`, or the next one does not
+        count.
+        """
         try:
-            return self._queue.get(timeout=timeout_s)
+            arrival = self._queue.get(timeout=timeout_s)
         except Empty:
             return None
+        return Reception(arrival) if self._counts(arrival) else None
 
 
 class RouterWatch:
