@@ -25,6 +25,7 @@ VERBS = {
     "explain": ("cogmap.cli.explain.command:explain", "Explain a moment of a recorded drive."),
     "goal": ("cogmap.cli.goal:goal", "Send the agent somewhere, and print its plan."),
     "graph": ("cogmap.cli.graph:graph", "Show which process uses which topics."),
+    "interface": ("cogmap.cli.interface:interface", "List and show the types of messages."),
     "log": ("cogmap.cli.log.command:log", "Record, inspect, draw, replay and compare logs."),
     "memory": (
         "cogmap.cli.memory.command:memory",
@@ -32,6 +33,7 @@ VERBS = {
     ),
     "module": ("cogmap.cli.processes:module", "Run one module as this process."),
     "name": ("cogmap.cli.name:name", "Name an object of the agent's map, or list them."),
+    "node": ("cogmap.cli.node:node", "List running processes, and what each one does."),
     "new": ("cogmap.cli.new.command:new", "Write a new codelet or module to begin with."),
     "router": ("cogmap.cli.processes:router", "Run the router that all modules connect to."),
     "run": ("cogmap.cli.run.command:run", "Drive through a simulated town, or play a recording."),

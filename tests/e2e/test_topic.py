@@ -1,4 +1,4 @@
-"""`cogmap topic`, `graph` and `doctor` on a running system, as users run them."""
+"""`cogmap topic`, `node`, `graph` and `doctor` on a running system, as users run them."""
 
 from __future__ import annotations
 
@@ -196,6 +196,16 @@ def test_graph_shows_the_process_and_its_topics(robot: Robot, endpoint: str) -> 
     assert sim["process"] == "sim"
     assert sim["subscribes"] == ["motor/command"]
     assert sim["publishes"] == ["odometry", "sensory/motion", "health"]
+
+
+def test_node_info_shows_what_a_process_does_and_how_it_fares(robot: Robot, endpoint: str) -> None:
+    names, _ = printed(endpoint, "node", "list")
+    output, _ = printed(endpoint, "node", "info", "sim", "--json")
+
+    facts = json.loads(output)
+    assert names == "sim\n"
+    assert facts["subscribes"] == {"motor/command": "MotorCommand"}
+    assert facts["health"]["ready"]
 
 
 def test_doctor_names_what_is_missing_and_what_is_off_its_rate(robot: Robot, endpoint: str) -> None:
