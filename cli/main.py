@@ -15,6 +15,7 @@ VERBS = {
         "cogmap.cli.architecture:architecture",
         "Write the generated parts of docs/architecture.md.",
     ),
+    "bag": ("cogmap.cli.log.command:log", "Another name of `cogmap log`, as ROS has it."),
     "config": ("cogmap.cli.config:print_config", "Print every setting of every module, as TOML."),
     "dashboard": (
         "cogmap.cli.dashboard.command:dashboard",

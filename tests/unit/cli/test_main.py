@@ -17,6 +17,7 @@ from cogmap.cli.topic.command import topic
 from cogmap.cli.verbs import LazyCommand
 from cogmap.recording.storage.format import SOFTWARE
 
+ALIASES = {"bag": "log"}
 HEAVY = {"matplotlib", "cv2", "pybullet", "scipy"}
 
 
@@ -54,7 +55,14 @@ def test_each_row_of_verbs_names_the_command_that_it_imports(row: click.Command)
     command = row.load()
 
     assert isinstance(command, click.Command)
-    assert command.name == row.name
+    assert command.name == ALIASES.get(row.name, row.name)
+
+
+def test_bag_is_another_name_of_log() -> None:
+    by_alias = CliRunner().invoke(cogmap, ["bag", "--help"], prog_name="cogmap")
+    by_name = CliRunner().invoke(cogmap, ["log", "--help"], prog_name="cogmap")
+
+    assert by_alias.output == by_name.output.replace("cogmap log [", "cogmap bag [")
 
 
 @pytest.mark.parametrize(
