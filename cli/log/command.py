@@ -17,6 +17,8 @@ VERBS = {
     "export": ("cogmap.cli.log.export:export", "Write a log for other tools: tables, Foxglove."),
     "replay": ("cogmap.cli.log.replay:replay", "Play a log onto the bus, or into modules."),
     "diff": ("cogmap.cli.log.inspect:diff", "Compare two logs message by message."),
+    "filter": ("cogmap.cli.log.copying:filter_", "Write a part of a log as another log."),
+    "merge": ("cogmap.cli.log.copying:merge", "Write several logs as one."),
     "recover": ("cogmap.cli.log.inspect:recover", "Save what is readable of a cut log."),
 }
 _EPILOG = """\b
@@ -29,13 +31,14 @@ A first session, while `cogmap run` runs in another terminal:
   cogmap log image drive.mcap         a camera image, as a file
   cogmap log replay drive.mcap --into sensory
   cogmap log export drive.mcap --csv tables
+  cogmap log filter drive.mcap small.mcap -x 'camera|view'
   cogmap log summary runs/latest      a run's folder stands for its log
 """
 
 
 @click.group(epilog=_EPILOG)
 def log() -> None:
-    """Record all messages on the bus; inspect, draw, replay, compare and recover logs."""
+    """Record all messages on the bus; inspect, draw, replay, compare, cut and recover logs."""
 
 
 add_verbs(log, VERBS)

@@ -11,9 +11,10 @@ import click
 import msgspec
 
 from cogmap.cli.log import report
+from cogmap.cli.log.choosing import check_span, start_option, until_option
 from cogmap.cli.messages.condition import ALWAYS, Condition, filter_option, parsed
 from cogmap.cli.messages.style import Form, Style, style_options
-from cogmap.cli.options import FiniteRange, json_option
+from cogmap.cli.options import json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.progress import bar
 from cogmap.errors import MessageError, UsageError
@@ -21,6 +22,7 @@ from cogmap.recording import diff as differ
 from cogmap.recording import info as informer
 from cogmap.recording import selection
 from cogmap.recording.storage import recover as rescuer
+from cogmap.recording.storage.format import MAX_TIME_NS
 from cogmap.recording.storage.reader import LogReader, Record
 from cogmap.schemas.render import to_jsonable
 
@@ -57,19 +59,16 @@ def info(log: Path, as_json: bool) -> None:
 @log_argument
 @click.argument("topics", nargs=-1)
 @click.option("-n", "number", type=click.IntRange(min=1), help="Print at most this many messages.")
-@click.option(
-    "--start-offset",
-    type=FiniteRange(min=0),
-    default=0.0,
-    help="Begin this many seconds after the start of the log.",
-)
+@start_option
+@until_option
 @filter_option
 @style_options
 def cat(
     log: Path,
     topics: tuple[str, ...],
     number: int | None,
-    start_offset: float,
+    start_s: float,
+    until_s: float | None,
     condition: str | None,
     style: Style,
 ) -> None:
@@ -77,14 +76,17 @@ def cat(
 
     With --json each has its topic, time and envelope beside it.
     """
+    check_span(start_s, until_s)
     chosen = selection.named(topics)
     if (condition is not None or style.fields) and len(chosen) != 1:
         raise UsageError("--filter and --field are for the messages of one topic: name it")
     wanted = parsed(condition, chosen[0]) if condition is not None else ALWAYS
 
     reader = LogReader(log)
-    start_ns = reader.span_ns[0] + int(start_offset * 1e9)
-    records = reader.records(chosen or None, start_ns=start_ns)
+    begin_ns = reader.span_ns[0]
+    start_ns = begin_ns + int(start_s * 1e9)
+    end_ns = MAX_TIME_NS if until_s is None else begin_ns + int(until_s * 1e9)
+    records = reader.records(chosen or None, start_ns=start_ns, end_ns=end_ns)
     meant = (record for record in records if _is_meant(reader, record, wanted))
     for record in islice(meant, number):
         write = _as_json if style.form is Form.JSON else _as_text

@@ -9,6 +9,12 @@ from pathlib import Path
 import click
 
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.log.choosing import (
+    COMPRESSIONS,
+    compression_option,
+    exclude_option,
+    regex_option,
+)
 from cogmap.cli.log.report import print_summary
 from cogmap.cli.options import FiniteRange, json_option
 from cogmap.cli.printing import print_json
@@ -42,14 +48,15 @@ Examples:
     help="The new file.  [default: cogmap_TIME.mcap]",
 )
 @click.option("-a", "--all", "everything", is_flag=True, help="Record every topic; the default.")
-@click.option("-e", "--regex", default="", help="Record topics that match this pattern too.")
-@click.option("-x", "--exclude", default="", help="Leave out topics that match this pattern.")
+@regex_option
+@exclude_option
 @click.option(
     "-d",
     "--max-duration",
     type=FiniteRange(min=0, min_open=True),
     help="End after this many seconds.",
 )
+@compression_option
 @click.option(
     "--instance",
     default=recorder.MODULE,
@@ -69,6 +76,7 @@ def record(
     regex: str,
     exclude: str,
     max_duration: float | None,
+    compression: str,
     instance: str,
     tied: bool,
     connect: str,
@@ -93,7 +101,14 @@ def record(
     bus = ZenohBus(connect, agent)
     stop = Stop(tied)  # only now: until a router answers, Ctrl-C ends the process at once
     try:
-        recording = recorder.Recorder(bus, path, chosen, about, instance=instance)
+        recording = recorder.Recorder(
+            bus,
+            path,
+            chosen,
+            about,
+            instance=instance,
+            compression=COMPRESSIONS[compression],
+        )
     except LogError:
         bus.close()
         raise

@@ -9,6 +9,13 @@ import click
 
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.log import report
+from cogmap.cli.log.choosing import (
+    check_span,
+    exclude_option,
+    regex_option,
+    start_option,
+    until_option,
+)
 from cogmap.cli.log.keys import Keys
 from cogmap.cli.options import FiniteRange, json_option
 from cogmap.cli.printing import print_json
@@ -28,6 +35,8 @@ Examples:
   cogmap log replay drive.mcap                      onto the bus, as recorded
   cogmap log replay drive.mcap -r 2 -l              twice as fast, again and again
   cogmap log replay drive.mcap --topics odometry --topics camera/stereo --clock
+  cogmap log replay drive.mcap -x '^truth/' --start-offset 10 --until 20
+  cogmap log replay drive.mcap --agent ghost        beside a running agent, under another name
   cogmap log replay drive.mcap --into sensory       is its output still the same?
   cogmap log replay drive.mcap --into epam --set epam.percept_threshold=0.6
 """
@@ -41,9 +50,10 @@ Examples:
 @click.option(
     "--topics", multiple=True, metavar="TOPIC", help="Play only this topic; may be repeated."
 )
-@click.option(
-    "--start-offset", type=FiniteRange(min=0), help="Begin this many seconds after the start."
-)
+@regex_option
+@exclude_option
+@start_option
+@until_option
 @click.option("-l", "--loop", is_flag=True, help="Play again and again.")
 @click.option(
     "--start-paused", is_flag=True, help="Begin paused; the space bar continues and pauses."
@@ -72,7 +82,10 @@ def replay(
     log: Path,
     rate: float | None,
     topics: tuple[str, ...],
-    start_offset: float | None,
+    regex: str,
+    exclude: str,
+    start_s: float,
+    until_s: float | None,
     loop: bool,
     start_paused: bool,
     clock_hz: float | None,
@@ -91,7 +104,8 @@ def replay(
     """
     overrides = config.load(config_path, settings)
     if into:
-        if rate or topics or start_offset or loop or start_paused or clock_hz:
+        chosen = (topics, regex, exclude, start_s, until_s)
+        if rate or any(chosen) or loop or start_paused or clock_hz:
             raise click.UsageError(
                 "--into replays everything as fast as it can: leave out the options of playing"
             )
@@ -110,10 +124,12 @@ def replay(
 
     if overrides:
         raise click.UsageError("--config and --set are for --into: messages are played as they are")
+    check_span(start_s, until_s)
     choices = Choices(
         rate=rate or 1.0,
-        topics=selection.named(topics) or None,
-        start_offset_s=start_offset or 0.0,
+        topics=selection.to_play(topics, regex, exclude),
+        start_offset_s=start_s,
+        end_s=until_s,
         loop=loop,
         clock_hz=clock_hz or 0.0,
     )

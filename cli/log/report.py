@@ -7,6 +7,7 @@ from datetime import datetime
 import click
 
 from cogmap.cli.printing import megabytes, print_table
+from cogmap.recording.copying import Copied
 from cogmap.recording.diff import Diff
 from cogmap.recording.info import Info
 from cogmap.recording.recorder import Summary
@@ -149,3 +150,16 @@ def print_recovery(recovery: Recovery) -> None:
             f"Lost: {recovery.lost_bytes} bytes, with {recovery.lost_messages} messages that an "
             "index names and whatever an unfinished chunk held."
         )
+
+
+def print_copied(copied: Copied) -> None:
+    """Print what is in a log that was made of others."""
+    number = sum(copied.messages.values())
+    click.echo(
+        f"{copied.path}: {number} messages on {len(copied.messages)} topics in "
+        f"{copied.duration_s:.1f} s, {megabytes(copied.size_bytes)}"
+    )
+    if copied.twice:
+        click.echo(f"{copied.twice} messages were in several logs, and are there once")
+    for name in copied.unknown:
+        click.echo(f"left out: {name}, which is no topic of this version")

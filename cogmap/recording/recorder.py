@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import msgspec
+from mcap.writer import CompressionType
 
 from cogmap.bus.interface import Arrival, Bus, Member
 from cogmap.errors import LogError
@@ -65,12 +66,13 @@ class Recorder:
         *,
         limit_bytes: int = LIMIT_BYTES,
         instance: str = MODULE,
+        compression: CompressionType = CompressionType.LZ4,
     ) -> None:
         now_ns = time.time_ns()
         self._bus = bus
         self._topics = topics
         self._instance = instance
-        self._writer = LogWriter(path, topics, {"began_ns": str(now_ns), **about})
+        self._writer = LogWriter(path, topics, {"began_ns": str(now_ns), **about}, compression)
         self._queue = WriteQueue(limit_bytes)
         self._intake = Intake()
         self._flush_timer = FlushTimer()

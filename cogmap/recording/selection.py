@@ -9,7 +9,7 @@ from cogmap.errors import UsageError
 from cogmap.hints import did_you_mean
 from cogmap.recording.storage.format import topics_to_record
 from cogmap.schemas import topics
-from cogmap.schemas.topics import Topic
+from cogmap.schemas.topics import Scope, Topic
 
 
 def named(names: Iterable[str | Topic]) -> list[Topic]:
@@ -64,7 +64,16 @@ def to_record(names: Iterable[str] = (), regex: str = "", exclude: str = "") -> 
 
     chosen = [topic for topic in recordable if topic in wanted]
     if not chosen:
-        raise UsageError(
-            "no topic is left to record: name some, or leave --regex and --exclude out"
-        )
+        raise UsageError("no topic is left: name some, or leave --regex and --exclude out")
     return chosen
+
+
+def to_play(names: Iterable[str] = (), regex: str = "", exclude: str = "") -> list[Topic]:
+    """Return the topics to play, as `to_record` does; without a choice, facts about processes are
+    left out, as those are of other ones.
+    """
+    wanted = list(names)
+    chosen = to_record(wanted, regex, exclude)
+    if wanted or regex:
+        return chosen
+    return [topic for topic in chosen if topic.scope is not Scope.PROCESS]

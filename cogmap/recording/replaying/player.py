@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from time import monotonic, time_ns
 
 import msgspec
@@ -13,25 +13,25 @@ from cogmap.bus.codec import Envelope
 from cogmap.bus.interface import Bus, Member
 from cogmap.errors import UsageError
 from cogmap.recording.replaying.pacing import ClockPublisher, Control, Pacer
+from cogmap.recording.selection import to_play
+from cogmap.recording.storage.format import MAX_TIME_NS
 from cogmap.recording.storage.reader import LogReader
 from cogmap.schemas import topics
-from cogmap.schemas.topics import Scope, Topic
+from cogmap.schemas.topics import Topic
 
 SOURCE = "replay"
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choices:
-    """How to play: `rate` times as fast, from `start_offset_s` on, `clock_hz` (0: none) messages on
-    the clock.
-
-    `topics` None is every MODEL and TRUTH topic of the log: facts about processes are those of
-    other ones.
+    """How to play: `topics`, `rate` times as fast, from `start_offset_s` (inclusive) to `end_s`
+    (exclusive) into the log, None its end, `clock_hz` (0: none) messages on the clock.
     """
 
     rate: float = 1.0
-    topics: Collection[Topic] | None = None
+    topics: Collection[Topic] = field(default_factory=to_play)
     start_offset_s: float = 0.0
+    end_s: float | None = None
     loop: bool = False
     clock_hz: float = 0.0
 
@@ -66,8 +66,6 @@ class Player:
         # What of the log is played, in the order of the table.
         recorded = {channel.topic for channel in reader.channels.values()}
         chosen = choices.topics
-        if chosen is None:
-            chosen = [topic for topic in topics.ALL if topic.scope is not Scope.PROCESS]
         self._topics = [each for each in topics.ALL if each.name in recorded and each in chosen]
 
         self._clock: ClockPublisher | None = None
@@ -100,13 +98,13 @@ class Player:
         Each round is a new incarnation of every source, as its numbers begin anew.
         """
         self._incarnations.clear()
-        offset_ns = int(self._choices.start_offset_s * 1e9)
-        start_ns = self._reader.span_ns[0] + offset_ns
+        begin_ns = self._reader.span_ns[0]
+        start_ns = begin_ns + int(self._choices.start_offset_s * 1e9)
+        end_s = self._choices.end_s
+        end_ns = MAX_TIME_NS if end_s is None else begin_ns + int(end_s * 1e9)
         self._pacer.begin(start_ns)
 
-        for record in self._reader.records(self._topics):
-            if record.log_time_ns < start_ns:
-                continue
+        for record in self._reader.records(self._topics, start_ns=start_ns, end_ns=end_ns):
             if not self._pacer.wait_until(record.log_time_ns, self._clock):
                 return
 

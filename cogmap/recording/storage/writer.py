@@ -59,13 +59,19 @@ class LogWriter:
     disk refuses; the log holds what was flushed before, and the writer is of no more use.
     """
 
-    def __init__(self, path: Path, topics: Iterable[Topic], about: Mapping[str, str]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        topics: Iterable[Topic],
+        about: Mapping[str, str],
+        compression: CompressionType = CompressionType.LZ4,
+    ) -> None:
         self.path = path
         self._file = open_new(path)
         self._last_log_ns = -1
         self._unflushed_bytes = 0
         self._waiting: dict[Content, list[_Waiting]] = {content: [] for content in Content}
-        self._writer = Writer(self._file, chunk_size=UNBOUNDED, compression=CompressionType.LZ4)
+        self._writer = Writer(self._file, chunk_size=UNBOUNDED, compression=compression)
         with self._on_disk():
             self._writer.start(layout.PROFILE, layout.SOFTWARE)
         self.note(layout.RECORDING, {"software": layout.SOFTWARE, **about})

@@ -128,6 +128,13 @@ def test_a_start_offset_leaves_out_what_was_before_it(path: Path) -> None:
     assert listener.numbers(topics.ODOMETRY) == list(range(5, COUNT))
 
 
+def test_what_comes_later_than_the_end_that_is_chosen_is_left_out(path: Path) -> None:
+    choices = Choices(rate=FAST, start_offset_s=0.015, end_s=0.045)
+    listener, _ = play(path, choices)
+
+    assert listener.numbers(topics.ODOMETRY) == [2, 3, 4]
+
+
 def test_each_round_of_a_loop_is_accepted_with_numbers_from_0(path: Path) -> None:
     network = MemoryNetwork()
     listener = Listener(network)

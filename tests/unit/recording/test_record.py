@@ -6,6 +6,7 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from mcap.writer import CompressionType
 
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Member
@@ -233,3 +234,12 @@ def test_an_existing_file_is_never_overwritten(path: Path) -> None:
     with pytest.raises(LogError, match="exists already"):
         Recorded(path)
     assert path.read_text() == "precious"
+
+
+@pytest.mark.parametrize("compression", CompressionType)
+def test_a_log_is_read_however_it_is_compressed(path: Path, compression: CompressionType) -> None:
+    recorder = Recorder(MemoryBus(MemoryNetwork()), path, to_record(), {}, compression=compression)
+    recorder.open()
+    recorder.close()
+
+    assert LogReader(path).about("summary")
