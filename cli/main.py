@@ -16,6 +16,10 @@ VERBS = {
         "Write the generated parts of docs/architecture.md.",
     ),
     "bag": ("cogmap.cli.log.command:log", "Another name of `cogmap log`, as ROS has it."),
+    "completion": (
+        "cogmap.cli.completion:completion",
+        "Let a shell complete verbs, options and topics.",
+    ),
     "config": ("cogmap.cli.config:print_config", "Print every setting of every module, as TOML."),
     "dashboard": (
         "cogmap.cli.dashboard.command:dashboard",

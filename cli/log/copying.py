@@ -19,6 +19,7 @@ from cogmap.cli.log.choosing import (
 from cogmap.cli.options import json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.progress import bar
+from cogmap.cli.topic.argument import topics_argument
 from cogmap.recording import selection
 from cogmap.recording.copying import Part, copy
 
@@ -39,7 +40,7 @@ _path = click.Path(path_type=Path)
 @click.command("filter", epilog=_FILTER_EPILOG)
 @click.argument("source", metavar="IN", type=_path)
 @click.argument("target", metavar="OUT", type=_path)
-@click.argument("topics", nargs=-1)
+@topics_argument
 @regex_option
 @exclude_option
 @start_option

@@ -9,6 +9,7 @@ import click
 from cogmap.cli.options import json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.progress import bar
+from cogmap.cli.topic.argument import topics_argument
 from cogmap.errors import UsageError
 from cogmap.recording import selection
 from cogmap.recording.exporting.foxglove import write_foxglove
@@ -25,7 +26,7 @@ Examples:
 
 @click.command(epilog=_EPILOG)
 @click.argument("log", type=click.Path(path_type=Path))
-@click.argument("topics", nargs=-1)
+@topics_argument
 @click.option(
     "--csv",
     "csv_folder",

@@ -17,6 +17,7 @@ from cogmap.cli.messages.style import Form, Style, style_options
 from cogmap.cli.options import json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.progress import bar
+from cogmap.cli.topic.argument import topics_argument
 from cogmap.errors import MessageError, UsageError
 from cogmap.recording import diff as differ
 from cogmap.recording import info as informer
@@ -57,7 +58,7 @@ def info(log: Path, as_json: bool) -> None:
 
 @click.command(epilog=_CAT_EPILOG)
 @log_argument
-@click.argument("topics", nargs=-1)
+@topics_argument
 @click.option("-n", "number", type=click.IntRange(min=1), help="Print at most this many messages.")
 @start_option
 @until_option
@@ -96,7 +97,7 @@ def cat(
 @click.command(epilog=_DIFF_EPILOG)
 @click.argument("left", type=click.Path(path_type=Path))
 @click.argument("right", type=click.Path(path_type=Path))
-@click.argument("topics", nargs=-1)
+@topics_argument
 @json_option
 def diff(left: Path, right: Path, topics: tuple[str, ...], as_json: bool) -> None:
     """Compare two logs message by message, on all topics of the model or on TOPICS.

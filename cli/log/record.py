@@ -18,6 +18,7 @@ from cogmap.cli.log.choosing import (
 from cogmap.cli.log.report import print_summary
 from cogmap.cli.options import FiniteRange, json_option
 from cogmap.cli.printing import print_json
+from cogmap.cli.topic.argument import topics_argument
 from cogmap.errors import LogError
 from cogmap.recording import recorder, selection
 from cogmap.runtime import config
@@ -40,7 +41,7 @@ Examples:
 
 
 @click.command(epilog=_EPILOG)
-@click.argument("topics", nargs=-1)
+@topics_argument
 @click.option(
     "-o",
     "--output",

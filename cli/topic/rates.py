@@ -14,7 +14,7 @@ from cogmap.bus.interface import Arrival
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.messages.condition import filter_option, parsed
 from cogmap.cli.options import json_option
-from cogmap.cli.topic.argument import streamed_topic
+from cogmap.cli.topic.argument import complete_topic, streamed_topic
 from cogmap.cli.topic.observing import TICK_S, Reception, Receptions, RouterWatch, observing
 from cogmap.cli.topic.statistics import Bandwidth, Delay, Rate, Statistics
 from cogmap.errors import UsageError
@@ -32,7 +32,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 def watch_options(window: int) -> Callable[[F], F]:
     """Make the options of what to watch, over `window` messages by default."""
     options = (
-        click.argument("names", nargs=-1, metavar="[TOPIC]..."),
+        click.argument("names", nargs=-1, metavar="[TOPIC]...", shell_complete=complete_topic),
         click.option("-a", "--all", "everything", is_flag=True, help="Watch every topic."),
         click.option(
             "-w",
