@@ -30,7 +30,10 @@ VERBS = {
     "explain": ("cogmap.cli.explain.command:explain", "Explain a moment of a recorded drive."),
     "goal": ("cogmap.cli.goal:goal", "Send the agent somewhere, and print its plan."),
     "graph": ("cogmap.cli.graph:graph", "Show which process uses which topics."),
-    "interface": ("cogmap.cli.interface:interface", "List and show the types of messages."),
+    "interface": (
+        "cogmap.cli.messages.interface:interface",
+        "List and show the types of messages.",
+    ),
     "log": ("cogmap.cli.log.command:log", "Record, inspect, draw, replay and compare logs."),
     "memory": (
         "cogmap.cli.memory.command:memory",

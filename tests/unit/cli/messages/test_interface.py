@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 from msgspec import inspect
 
-from cogmap.cli.interface import interface, struct_named
+from cogmap.cli.messages.interface import interface, struct_named
 from cogmap.cli.messages.types import messages_and_parts, unit_of, words
 from cogmap.errors import UsageError
 from cogmap.schemas import topics
