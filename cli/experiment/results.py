@@ -28,10 +28,11 @@ KINDS = ("png", "pdf")
 
 
 def folder_for(name: str, out: Path | None) -> Path:
-    """Make `out`, or the folder runs/`name`, if it is missing. It is gone again when the command
-    has ended, if nothing was written there. Raises UsageError if it cannot be made.
+    """Make `out`, or the folder runs/`name`, if it is missing; one that was made is gone again when
+    the command has ended without writing there. Raises UsageError if it cannot be made.
     """
     folder = out if out is not None else Path("runs") / name
+    is_new = not folder.exists()
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -40,7 +41,8 @@ def folder_for(name: str, out: Path | None) -> Path:
             f"cannot make the folder {folder} ({error.strerror}): name another with --out"
         ) from None
 
-    click.get_current_context().call_on_close(lambda: _remove_empty(folder))
+    if is_new:
+        click.get_current_context().call_on_close(lambda: _remove_empty(folder))
     return folder
 
 

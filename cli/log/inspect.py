@@ -130,15 +130,13 @@ def recover(source: Path, target: Path, as_json: bool) -> None:
 
 
 def _is_meant(reader: LogReader, record: Record, wanted: Condition) -> bool:
-    """Decide whether a message is to be printed: one that cannot be read is, unless --filter asks
-    for its values.
-    """
+    """Decide whether a message is to be printed: one that cannot be read is, with the reason."""
     if wanted is ALWAYS:
         return True
     try:
         return wanted.holds(reader.message(record))
     except MessageError:
-        return False
+        return True
 
 
 def _as_json(reader: LogReader, record: Record, style: Style) -> str:

@@ -52,7 +52,8 @@ filter_option = click.option(
     "--filter",
     "condition",
     metavar="CONDITION",
-    help='Only messages such as "speed_m_s > 1.5 and source == sim".',
+    help="Only messages for which this holds: fields compared with values (== != < <= > >=), "
+    'joined by and, such as "speed_m_s > 1.5 and source == sim".',
 )
 
 

@@ -111,11 +111,13 @@ class ValidMessages:
     def counts(self) -> str:
         """Count the messages that were printed, and those that were not, by reason."""
         name = self._topic.name
-        others = {
-            "left out by --filter": self.intake.received[name] - self.number,
-            "rejected": self.intake.rejected[name],
-            "lost": self.intake.gaps[name],
-            "superseded by newer ones": self.inbox.superseded[name],
-        }
-        counted = [f"{number} {reason}" for reason, number in others.items()]
-        return ", ".join([f"{self.number} messages", *counted])
+        left_out = self.intake.received[name] - self.number
+        counted = [
+            f"{self.number} messages",
+            f"{self.intake.rejected[name]} rejected",
+            f"{self.intake.gaps[name]} lost",
+            f"{self.inbox.superseded[name]} superseded by newer ones",
+        ]
+        if left_out:
+            counted.append(f"{left_out} left out by --filter")
+        return ", ".join(counted)

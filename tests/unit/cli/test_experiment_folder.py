@@ -31,3 +31,9 @@ def test_a_folder_in_which_nothing_was_written_is_gone(tmp_path: Path, writes: b
     ended(folder, writes=writes)
 
     assert folder.exists() == writes
+
+
+def test_a_folder_of_the_user_stays(tmp_path: Path) -> None:
+    ended(tmp_path, writes=False)
+
+    assert tmp_path.exists()
