@@ -14,7 +14,10 @@ VERBS = {
     "map": ("cogmap.cli.log.summary:draw_map", "Draw the true town and the learned map."),
     "image": ("cogmap.cli.log.pictures:image", "Save a camera image."),
     "perception": ("cogmap.cli.log.pictures:perception", "Draw what was perceived in a view."),
-    "export": ("cogmap.cli.log.export:export", "Write a log for other tools: tables, Foxglove."),
+    "export": (
+        "cogmap.cli.log.export:export",
+        "Write a log for other tools: tables, Foxglove, ROS.",
+    ),
     "replay": ("cogmap.cli.log.replay:replay", "Play a log onto the bus, or into modules."),
     "diff": ("cogmap.cli.log.inspect:diff", "Compare two logs message by message."),
     "filter": ("cogmap.cli.log.copying:filter_", "Write a part of a log as another log."),

@@ -13,6 +13,7 @@ from cogmap.cli.topic.argument import topics_argument
 from cogmap.errors import UsageError
 from cogmap.recording import selection
 from cogmap.recording.exporting.foxglove import write_foxglove
+from cogmap.recording.exporting.rosbag2 import write_rosbag2
 from cogmap.recording.exporting.tables import TableFormat, write_tables
 from cogmap.recording.log import open_log
 
@@ -21,6 +22,7 @@ Examples:
   cogmap log export runs/latest --csv tables               every topic but images
   cogmap log export drive.mcap --parquet tables odometry truth/pose
   cogmap log export runs/latest --foxglove drive.foxglove.mcap
+  cogmap log export runs/latest --rosbag2 bag    then `ros2 bag play bag`
 """
 
 
@@ -50,6 +52,14 @@ Examples:
     help="Write images, depth, poses, path, map and range scans for Foxglove into the new file "
     "FILE; TOPICS are of no matter.",
 )
+@click.option(
+    "--rosbag2",
+    "bag_folder",
+    type=click.Path(path_type=Path),
+    metavar="DIR",
+    help="Write images, depth, odometry, poses, path and map as a bag of ROS 2 into the new folder "
+    "DIR; TOPICS are of no matter.",
+)
 @json_option
 def export(
     log: Path,
@@ -57,6 +67,7 @@ def export(
     csv_folder: Path | None,
     parquet_folder: Path | None,
     foxglove_path: Path | None,
+    bag_folder: Path | None,
     as_json: bool,
 ) -> None:
     """Write the drive in LOG, or the messages of TOPICS in it, as other tools read it.
@@ -66,7 +77,9 @@ def export(
     """
     folders = {TableFormat.CSV: csv_folder, TableFormat.PARQUET: parquet_folder}
     tables = [(kind, folder) for kind, folder in folders.items() if folder is not None]
-    if not tables and foxglove_path is None:
+    for_viewers = {write_foxglove: foxglove_path, write_rosbag2: bag_folder}
+    drives = [(write, path) for write, path in for_viewers.items() if path is not None]
+    if not tables and not drives:
         raise UsageError("name a format and where to write it, such as --csv DIR")
 
     written: dict[str, dict[str, int]] = {}
@@ -75,9 +88,9 @@ def export(
         for kind, folder in tables:
             with bar(f"writing {folder}") as progress:
                 written[str(folder)] = write_tables(opened, folder, kind, chosen, progress)
-        if foxglove_path is not None:
-            with bar(f"writing {foxglove_path}") as progress:
-                written[str(foxglove_path)] = write_foxglove(opened, foxglove_path, progress)
+        for write, path in drives:
+            with bar(f"writing {path}") as progress:
+                written[str(path)] = write(opened, path, progress)
 
     if as_json:
         print_json(written)
