@@ -49,7 +49,7 @@ class RectifiedRecording(StereoRecording):
     def pair(self, number: int) -> tuple[Bytes, Bytes]:
         """Return a pair, rectified. Raises UsageError as StereoRecording does."""
         left, right = super().pair(number)
-        return _remapped(left, self.maps[0]), _remapped(right, self.maps[1])
+        return remapped(left, self.maps[0]), remapped(right, self.maps[1])
 
 
 def rectified(left: Camera, right: Camera, mount_height_m: float, source: Path) -> RectifiedPair:
@@ -96,14 +96,16 @@ def rectified(left: Camera, right: Camera, mount_height_m: float, source: Path) 
         mount_height_m=mount_height_m,
     )
     return RectifiedPair(
-        left=_maps(left, np.asarray(left_turn, np.float64), np.asarray(seen_left, np.float64)),
-        right=_maps(right, np.asarray(right_turn, np.float64), np.asarray(seen_right, np.float64)),
+        left=maps_of(left, np.asarray(left_turn, np.float64), np.asarray(seen_left, np.float64)),
+        right=maps_of(
+            right, np.asarray(right_turn, np.float64), np.asarray(seen_right, np.float64)
+        ),
         calibration=calibration,
         on_body=on_body,
     )
 
 
-def _maps(camera: Camera, turn: Floats, seen: Floats) -> Maps:
+def maps_of(camera: Camera, turn: Floats, seen: Floats) -> Maps:
     """Return where each pixel comes from, of a camera that is turned and sees by another matrix."""
     columns, rows = cv2.initUndistortRectifyMap(
         camera.matrix,
@@ -116,6 +118,7 @@ def _maps(camera: Camera, turn: Floats, seen: Floats) -> Maps:
     return np.asarray(columns, np.float32), np.asarray(rows, np.float32)
 
 
-def _remapped(image: Bytes, maps: Maps) -> Bytes:
+def remapped(image: Bytes, maps: Maps) -> Bytes:
+    """Return an image of the pixels that the maps name, of the same size."""
     columns, rows = maps
     return np.asarray(cv2.remap(image, columns, rows, cv2.INTER_LINEAR), np.uint8)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Protocol
 
 import cv2
 import numpy as np
@@ -16,6 +17,27 @@ from cogmap.schemas.sensing import Calibration
 
 GIVE = "the picture that the camera took"
 REMEDY = "copy it again, or leave this pair out"
+
+
+class StereoPairs(Protocol):
+    """The pairs of a camera, in order of time, wherever they are: see StereoRecording."""
+
+    @property
+    def calibration(self) -> Calibration:
+        """Return the calibration of the pairs."""
+
+    @property
+    def stamps_ns(self) -> Indices:
+        """Return the stamp of each pair, int64 (n,), of one clock."""
+
+    @property
+    def true_poses(self) -> Floats | None:
+        """Return where the left camera really was, None if nobody measured it."""
+
+    def pair(self, number: int) -> tuple[Bytes, Bytes]:
+        """Return the left and the right picture of a pair, each uint8 (h, w), or RGB (h, w, 3).
+        Raises UsageError if it cannot be read.
+        """
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import msgspec
 
+from cogmap.schemas.base import Metres
+
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """A recording that is played in the place of the simulation."""
@@ -23,6 +25,28 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             ge=1, le=1000, description="Number of the robot, where a recording has several."
         ),
     ] = 1
+    left_topic: Annotated[
+        str,
+        msgspec.Meta(
+            description="Topic of the left camera's images in a bag. Empty if its name, or what "
+            "the cameras say of where they stand, tells it."
+        ),
+    ] = ""
+    right_topic: Annotated[
+        str,
+        msgspec.Meta(description="The same of the right camera's."),
+    ] = ""
+    odometry_topic: Annotated[
+        str,
+        msgspec.Meta(description="Topic of the odometry in a bag. Empty if it has one or none."),
+    ] = ""
+    mount_height_m: Annotated[
+        Metres,
+        msgspec.Meta(
+            description="How high above the ground a bag's cameras stand. 0 is as its static "
+            "transforms say, or 1 m."
+        ),
+    ] = 0.0
     speed: Annotated[
         float,
         msgspec.Meta(

@@ -27,6 +27,10 @@ class Format(NamedTuple):
 
 
 FORMATS = {
+    "bag": Format(
+        "bag of ROS 1 or 2, or MCAP file of ROS 2: cameras, odometry",
+        "cogmap.services.player.bags:opened",
+    ),
     "kitti": Format(
         "folder of a KITTI odometry sequence: calib.txt, image_0 and image_1",
         "cogmap.services.player.stereo:kitti",

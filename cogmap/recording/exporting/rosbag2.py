@@ -11,7 +11,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cogmap.errors import UsageError
-from cogmap.geometry.se2 import compose, moved_by, relative
+from cogmap.geometry.arrays import Floats
+from cogmap.geometry.se2 import compose, relative
 from cogmap.recording.exporting.moments import (
     OBJECT_HEIGHT_M,
     OBJECT_WIDTH_M,
@@ -169,8 +170,7 @@ class _Drive:
             self._write_odometry_pose(moved)
             self._stamp_ns = end_ns
 
-        motion = np.array([[moved.speed_m_s, moved.turn_rate_rad_s, moved.dt_s]])
-        self._odometry = moved_by(self._odometry, motion)
+        self._odometry = compose(self._odometry, _arc(moved))
         self._write_odometry_pose(moved)
 
     def _write_odometry_pose(self, moved: Odometry) -> None:
@@ -261,6 +261,13 @@ class _Drive:
                 self._header(MAP), percent.astype(np.int8), known.cell_m, known.corner_m
             ),
         )
+
+
+def _arc(moved: Odometry) -> Floats:
+    """Return where a motion leads to, (3,), if both of its speeds are even."""
+    half_rad = moved.turn_rate_rad_s * moved.dt_s / 2
+    chord_m = moved.speed_m_s * moved.dt_s * np.sinc(half_rad / np.pi)
+    return np.array([chord_m * np.cos(half_rad), chord_m * np.sin(half_rad), 2 * half_rad])
 
 
 def _quality(topic: str) -> list[Any]:

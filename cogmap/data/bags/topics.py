@@ -1,0 +1,113 @@
+"""Which topics of a bag are the cameras of a pair, and which one is the odometry."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import NamedTuple
+
+from cogmap.data.bags.bag import Bag
+from cogmap.data.bags.cameras import camera_of
+
+IMAGE = "sensor_msgs/msg/Image"
+COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
+CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
+ODOMETRY = "nav_msgs/msg/Odometry"
+IMAGES = (IMAGE, COMPRESSED_IMAGE)
+SET_PAIR = "name the images by --set player.left_topic=TOPIC --set player.right_topic=TOPIC"
+SET_ODOMETRY = "name one by --set player.odometry_topic=TOPIC"
+
+
+class Topics(NamedTuple):
+    """Topics of a stereo camera's images, and of odometry; empty where they are to be found."""
+
+    left: str = ""
+    right: str = ""
+    odometry: str = ""
+
+
+def chosen(bag: Bag, given: Topics) -> Topics:
+    """Return the topics to read; without odometry, none of it is named.
+
+    Those that are given are taken; a pair is found by left and right in the names, else by what the
+    cameras say of where they stand. Raises UsageError if a topic is missing or of another type, or
+    if there are several to choose from.
+    """
+    for name in (given.left, given.right):
+        _check(bag, name, IMAGES, SET_PAIR)
+    _check(bag, given.odometry, (ODOMETRY,), SET_ODOMETRY)
+    left, right = _pair(bag, given)
+    return Topics(left, right, given.odometry or _odometry(bag))
+
+
+def camera_info(bag: Bag, images: str) -> str:
+    """Return the topic that describes the camera of a topic of images. Raises UsageError if there
+    is none.
+    """
+    found = _camera_info(bag, images)
+    if not found:
+        beside = f"{images.rpartition('/')[0]}/camera_info"
+        raise bag.wrong(
+            f"has no {beside} ({CAMERA_INFO}), the calibration for {images}",
+            "record it, too, or give the pictures as a folder of images with camera.toml",
+        )
+    return found
+
+
+def _camera_info(bag: Bag, images: str) -> str:
+    """Return the CameraInfo beside a topic of images, or beside the one that it compresses; empty
+    if there is none.
+    """
+    beside, _, _ = images.rpartition("/")
+    above, _, _ = beside.rpartition("/")
+    for folder in (beside, above):
+        if bag.topics.get(f"{folder}/camera_info") == CAMERA_INFO:
+            return f"{folder}/camera_info"
+    return ""
+
+
+def _check(bag: Bag, name: str, kinds: tuple[str, ...], remedy: str) -> None:
+    if name and bag.topics.get(name) not in kinds:
+        raise bag.wrong(f"has no topic {name} of type {' or '.join(kinds)}", remedy)
+
+
+def _pair(bag: Bag, given: Topics) -> tuple[str, str]:
+    if given.left and given.right:
+        return given.left, given.right
+
+    images = bag.of_kind(*IMAGES)
+    pairs = [(left, _other_side(left)) for left in images]
+    pairs = [(left, right) for left, right in pairs if right != left and right in images]
+    pairs = pairs or _pairs_by_baseline(bag, images)
+    pairs = [pair for pair in pairs if given.left in {"", pair[0]} and given.right in {"", pair[1]}]
+    if not pairs:
+        raise bag.wrong("has no pair of topics of images, left and right", SET_PAIR)
+    if len(pairs) > 1:
+        shown = " or ".join(f"{left} and {right}" for left, right in pairs)
+        raise bag.wrong(f"has several pairs of images, {shown}", SET_PAIR)
+    return pairs[0]
+
+
+def _other_side(left: str) -> str:
+    """Return the name of a left camera's topic with `right` for each `left`."""
+    return left.replace("left", "right").replace("Left", "Right")
+
+
+def _pairs_by_baseline(bag: Bag, images: list[str]) -> list[tuple[str, str]]:
+    """Return every two topics of which the second one's camera says that it stands to the right
+    of one that says nothing of that kind.
+    """
+    shifted: dict[bool, list[str]] = {False: [], True: []}
+    for name in images:
+        described = _camera_info(bag, name)
+        if described:
+            stands_right = camera_of(bag.first(described)).baseline_m > 0
+            shifted[stands_right].append(name)
+    return list(product(shifted[False], shifted[True]))
+
+
+def _odometry(bag: Bag) -> str:
+    """Return the topic of odometry, empty if there is none."""
+    found = bag.of_kind(ODOMETRY)
+    if len(found) > 1:
+        raise bag.wrong(f"has several topics of odometry, {' and '.join(found)}", SET_ODOMETRY)
+    return found[0] if found else ""
