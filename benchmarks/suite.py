@@ -18,6 +18,7 @@ from benchmarks.cognition import measure as cognition
 from benchmarks.cycle import measure as cycle
 from benchmarks.dashboard import measure as dashboard
 from benchmarks.explore import measure as explore
+from benchmarks.export import measure as export
 from benchmarks.individuals import measure as individuals
 from benchmarks.learning import measure as learning
 from benchmarks.lifelong import measure as lifelong
@@ -159,6 +160,7 @@ SUITE = (
     Benchmark("learning", learning.THRESHOLDS, learning.measure, options=[PROCESSES]),
     Benchmark("lifelong", lifelong.THRESHOLDS, lifelong.measure, options=lifelong.OPTIONS),
     Benchmark("dashboard", dashboard.THRESHOLDS, dashboard.measure, options=dashboard.OPTIONS),
+    Benchmark("export", export.THRESHOLDS, export.measure, options=export.OPTIONS),
     Benchmark("log_api", log_api.THRESHOLDS, log_api.measure, options=log_api.OPTIONS),
     Benchmark(
         "cue-integration",

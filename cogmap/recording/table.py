@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import enum
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from operator import attrgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -47,12 +48,18 @@ def table(kind: type[Message], rows: Iterable[tuple[float, Message]]) -> pyarrow
         messages.append(message)
 
     columns = {TIME: arrow.array(times_s, arrow.float64())}
-    for name, column in _columns(kind, ""):
+    for name, column in _columns_of(kind):
         values = map(attrgetter(name), messages)
         if column.convert is not None:
             values = map(column.convert, values)
         columns[name] = arrow.array(list(values), column.type)
     return arrow.table(columns)
+
+
+@cache
+def _columns_of(kind: type[Message]) -> tuple[tuple[str, _Kind], ...]:
+    """Return the columns of a message's fields: a long log asks for them again and again."""
+    return tuple(_columns(kind, ""))
 
 
 def _columns(kind: type[msgspec.Struct], prefix: str) -> Iterator[tuple[str, _Kind]]:

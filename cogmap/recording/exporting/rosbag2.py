@@ -22,7 +22,13 @@ from cogmap.recording.exporting.moments import (
     moments,
     points_of,
 )
-from cogmap.recording.exporting.ros_messages import OPTICAL_AXES, RosMessages, turned
+from cogmap.recording.exporting.ros_messages import (
+    OPTICAL_AXES,
+    Position,
+    Quaternion,
+    RosMessages,
+    turned,
+)
 from cogmap.recording.log import Log
 from cogmap.recording.storage.reader import Progress
 from cogmap.recording.views import depth
@@ -117,8 +123,9 @@ class _Drive:
         kind = message.__msgtype__
         connection = self._connections.get(topic)
         if connection is None:
+            quality = [_latched()] if topic in LATCHED else []
             connection = self._writer.add_connection(
-                topic, kind, typestore=self._store, offered_qos_profiles=_quality(topic)
+                topic, kind, typestore=self._store, offered_qos_profiles=quality
             )
             self._connections[topic] = connection
         content = self._store.serialize_cdr(message, kind)
@@ -128,9 +135,11 @@ class _Drive:
     def _header(self, frame: str) -> Any:
         return self._ros.header(self._stamp_ns, frame)
 
-    def _write_transform(self, topic: str, parent: str, child: str, *placed: Any) -> None:
-        transform = self._ros.transform(self._header(parent), child, *placed)
-        self._write(topic, self._ros.make("tf2_msgs/msg/TFMessage", [transform]))
+    def _transform(self, parent: str, child: str, place_m: Position, turn: Quaternion) -> Any:
+        return self._ros.transform(self._header(parent), child, place_m, turn)
+
+    def _write_transforms(self, topic: str, *transforms: Any) -> None:
+        self._write(topic, self._ros.make("tf2_msgs/msg/TFMessage", list(transforms)))
 
     def _write_pair(self, pair: StereoFrame) -> None:
         camera = pair.calibration
@@ -138,8 +147,12 @@ class _Drive:
             self._has_mount = True
             forward_m = (camera.mount_forward_m, 0.0, camera.mount_height_m)
             right = Rotation.from_rotvec(camera.right_rotation_rad).as_quat().tolist()
-            self._write_transform("/tf_static", ROBOT, LEFT, forward_m, OPTICAL_AXES)
-            self._write_transform("/tf_static", LEFT, RIGHT, (camera.baseline_m, 0.0, 0.0), right)
+            aside_m = (camera.baseline_m, 0.0, 0.0)
+            self._write_transforms(
+                "/tf_static",
+                self._transform(ROBOT, LEFT, forward_m, OPTICAL_AXES),
+                self._transform(LEFT, RIGHT, aside_m, tuple(right)),
+            )
 
         left = self._header(LEFT)
         right = self._header(RIGHT)
@@ -185,7 +198,8 @@ class _Drive:
             twist=self._ros.make("geometry_msgs/msg/TwistWithCovariance", twist, np.zeros(36)),
         )
         self._write("/odom", message)
-        self._write_transform("/tf", ODOM, ROBOT, (x_m, y_m, 0.0), turned(heading_rad))
+        placed = self._transform(ODOM, ROBOT, (x_m, y_m, 0.0), turned(heading_rad))
+        self._write_transforms("/tf", placed)
 
     def _write_command(self, command: MotorCommand) -> None:
         left_m_s = command.left_wheel_rad_s * WHEEL_RADIUS_M
@@ -208,7 +222,8 @@ class _Drive:
         believed = np.array([agent.x_m, agent.y_m, agent.heading_rad])
         origin = compose(believed, relative(self._odometry, np.zeros(3)))
         x_m, y_m, heading_rad = origin.tolist()
-        self._write_transform("/tf", MAP, ODOM, (x_m, y_m, 0.0), turned(heading_rad))
+        placed = self._transform(MAP, ODOM, (x_m, y_m, 0.0), turned(heading_rad))
+        self._write_transforms("/tf", placed)
 
     def _write_sentence(self, said: Sentence) -> None:
         line = self._ros.make(
@@ -270,25 +285,22 @@ def _arc(moved: Odometry) -> Floats:
     return np.array([chord_m * np.cos(half_rad), chord_m * np.sin(half_rad), 2 * half_rad])
 
 
-def _quality(topic: str) -> list[Any]:
-    """Return the quality of service that a topic was offered with."""
+def _latched() -> Any:
+    """Return the quality of service by which late subscribers get the last message, too."""
     from rosbags import interfaces as ros
 
     never = ros.QosTime(2147483647, 4294967295)
-    is_latched = topic in LATCHED
-    durability = ros.QosDurability.TRANSIENT_LOCAL if is_latched else ros.QosDurability.VOLATILE
-    offered = ros.Qos(
+    return ros.Qos(
         history=ros.QosHistory.KEEP_LAST,
-        depth=10,
+        depth=1,
         reliability=ros.QosReliability.RELIABLE,
-        durability=durability,
+        durability=ros.QosDurability.TRANSIENT_LOCAL,
         deadline=never,
         lifespan=never,
         liveliness=ros.QosLiveliness.AUTOMATIC,
         liveliness_lease_duration=never,
         avoid_ros_namespace_conventions=False,
     )
-    return [offered]
 
 
 def _library() -> Any:

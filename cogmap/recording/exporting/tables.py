@@ -83,7 +83,7 @@ def _write_parquet(path: Path, parts: Iterator[pyarrow.Table]) -> int:
 def _write_csv(path: Path, parts: Iterator[pyarrow.Table]) -> int:
     from pyarrow import csv
 
-    return _write(map(_flat, parts), lambda schema: csv.CSVWriter(path, schema))
+    return _write(map(flat, parts), lambda schema: csv.CSVWriter(path, schema))
 
 
 def _write(parts: Iterator[pyarrow.Table], opened: Callable[[pyarrow.Schema], Any]) -> int:
@@ -102,7 +102,7 @@ def _write(parts: Iterator[pyarrow.Table], opened: Callable[[pyarrow.Schema], An
     return rows
 
 
-def _flat(part: pyarrow.Table) -> pyarrow.Table:
+def flat(part: pyarrow.Table) -> pyarrow.Table:
     """Return a table whose lists, maps and structs are JSON."""
     import pyarrow
 
