@@ -129,15 +129,27 @@ class Log:
         `start_s` (inclusive) to `end_s` (exclusive). Raises as `messages` does, and UsageError if
         there is no pyarrow.
         """
-        (chosen,) = selection.named([topic])
+        chosen = selection.named([topic])
+        ((_, only),) = self.frames(chosen, start_s=start_s, end_s=end_s)
+        return only
+
+    def frames(
+        self, topics: Collection[Topic], *, start_s: float = 0.0, end_s: float | None = None
+    ) -> Iterator[tuple[Topic, pyarrow.Table]]:
+        """Yield each of `topics` with its table, as `frame` gives it; the log is read once for all.
+
+        Raises as `frame` does.
+        """
         first_ns, end_ns = self._span_ns(start_s, end_s)
-        payloads = self._reader.payloads(chosen, start_ns=first_ns, end_ns=end_ns)
+        payloads = self._reader.payloads(topics, start_ns=first_ns, end_ns=end_ns)
+        for topic, found in payloads.items():
+            yield topic, table.table(topic.type, self._rows(topic, found))
 
-        def rows() -> Iterator[tuple[float, Message]]:
-            for log_time_ns, payload in payloads:
-                yield (log_time_ns - self._start_ns) / 1e9, self._decoded(chosen, payload)
-
-        return table.table(chosen.type, rows())
+    def _rows(
+        self, topic: Topic, payloads: list[tuple[int, bytes]]
+    ) -> Iterator[tuple[float, Message]]:
+        for log_time_ns, payload in payloads:
+            yield (log_time_ns - self._start_ns) / 1e9, self._decoded(topic, payload)
 
     def path_frame(self, time_s: float | None = None) -> pyarrow.Table:
         """Return the agent's path as it believed it at `time_s` into the log, at its end if that is

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import enum
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,56 +50,81 @@ def write_tables(
 
     chosen = [topic for topic in topics if kind is TableFormat.PARQUET or not topic.carries_images]
     rows: dict[str, int] = {}
-    for number, topic in enumerate(chosen):
+    groups = _groups(chosen)
+    for number, group in enumerate(groups):
 
         def done(share: float, number: int = number) -> None:
             if progress is not None:
-                progress((number + share) / len(chosen))
+                progress((number + share) / len(groups))
 
-        path = folder / f"{topic.file_stem}.{kind.value}"
-        count = _WRITERS[kind](path, _parts(log, topic, done))
-        if count:
-            rows[topic.name] = count
-    return rows
+        rows |= _write_group(log, folder, kind, group, done)
+    return {topic.name: rows[topic.name] for topic in chosen if rows[topic.name]}
 
 
-def _parts(log: Log, topic: Topic, done: Progress) -> Iterator[pyarrow.Table]:
-    """Yield the table of a topic in parts that are not empty."""
+def _groups(topics: list[Topic]) -> list[list[Topic]]:
+    """Return the topics that are read at once: all small ones, and each one of images by itself,
+    which would fill the memory.
+    """
+    images = [[topic] for topic in topics if topic.carries_images]
+    small = [topic for topic in topics if not topic.carries_images]
+    return [small, *images] if small else images
+
+
+def _write_group(
+    log: Log, folder: Path, kind: TableFormat, group: list[Topic], done: Progress
+) -> dict[str, int]:
+    """Write the files of some topics, in parts. Returns the number of rows by topic."""
+    files = {topic: _File(folder / f"{topic.file_stem}.{kind.value}", kind) for topic in group}
     begin_s = 0.0
-    while begin_s <= log.duration_s:
-        part = log.frame(topic, start_s=begin_s, end_s=begin_s + SPAN_S)
-        begin_s += SPAN_S
-        done(min(1.0, begin_s / (log.duration_s + SPAN_S)))
-        if part.num_rows:
-            yield part
+    try:
+        while begin_s <= log.duration_s:
+            for topic, part in log.frames(group, start_s=begin_s, end_s=begin_s + SPAN_S):
+                files[topic].write(part)
+            begin_s += SPAN_S
+            done(min(1.0, begin_s / (log.duration_s + SPAN_S)))
+    finally:
+        for file in files.values():
+            file.close()
+    return {topic.name: file.rows for topic, file in files.items()}
 
 
-def _write_parquet(path: Path, parts: Iterator[pyarrow.Table]) -> int:
+class _File:
+    """A file of a table, which is made with its first row."""
+
+    def __init__(self, path: Path, kind: TableFormat) -> None:
+        self.rows = 0
+        self._path = path
+        self._kind = kind
+        self._writer: Any = None
+
+    def write(self, part: pyarrow.Table) -> None:
+        """Add the rows of a part."""
+        if not part.num_rows:
+            return
+
+        if self._kind is TableFormat.CSV:
+            part = flat(part)
+        if self._writer is None:
+            self._writer = _WRITERS[self._kind](self._path, part.schema)
+        self._writer.write_table(part)
+        self.rows += part.num_rows
+
+    def close(self) -> None:
+        """Finish the file, if there is one."""
+        if self._writer is not None:
+            self._writer.close()
+
+
+def _parquet_writer(path: Path, schema: pyarrow.Schema) -> Any:
     from pyarrow import parquet
 
-    return _write(parts, lambda schema: parquet.ParquetWriter(path, schema))
+    return parquet.ParquetWriter(path, schema)
 
 
-def _write_csv(path: Path, parts: Iterator[pyarrow.Table]) -> int:
+def _csv_writer(path: Path, schema: pyarrow.Schema) -> Any:
     from pyarrow import csv
 
-    return _write(map(flat, parts), lambda schema: csv.CSVWriter(path, schema))
-
-
-def _write(parts: Iterator[pyarrow.Table], opened: Callable[[pyarrow.Schema], Any]) -> int:
-    """Write all parts by the writer that `opened` returns for their schema. Returns the rows."""
-    writer = None
-    rows = 0
-    try:
-        for part in parts:
-            if writer is None:
-                writer = opened(part.schema)
-            writer.write_table(part)
-            rows += part.num_rows
-    finally:
-        if writer is not None:
-            writer.close()
-    return rows
+    return csv.CSVWriter(path, schema)
 
 
 def flat(part: pyarrow.Table) -> pyarrow.Table:
@@ -116,7 +141,7 @@ def flat(part: pyarrow.Table) -> pyarrow.Table:
     return pyarrow.table(columns)
 
 
-_WRITERS: dict[TableFormat, Callable[[Path, Iterator[pyarrow.Table]], int]] = {
-    TableFormat.CSV: _write_csv,
-    TableFormat.PARQUET: _write_parquet,
+_WRITERS: dict[TableFormat, Callable[[Path, pyarrow.Schema], Any]] = {
+    TableFormat.CSV: _csv_writer,
+    TableFormat.PARQUET: _parquet_writer,
 }

@@ -8,7 +8,7 @@ first record that is not whole.
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from io import BytesIO
@@ -145,20 +145,24 @@ def open_chunk(chunk: Chunk) -> list[McapRecord]:
         raise DamageError(str(error)) from error
 
 
-def read_messages(file: BinaryIO, chunk: ChunkSpan, channel: int) -> list[Message]:
-    """Read the messages of a chunk on one channel, by the chunk's index of them: a fraction of what
-    all its records cost. Raises DamageError, also for a wrong checksum.
+def read_messages(file: BinaryIO, chunk: ChunkSpan, channels: Collection[int]) -> list[Message]:
+    """Read the messages of a chunk on some channels, by the chunk's indexes of them: a fraction of
+    what all its records cost. Raises DamageError, also for a wrong checksum.
     """
     assert chunk.indexes is not None
-    where = chunk.indexes.get(channel)
-    if where is None:
+    indexed = [channel for channel in sorted(channels) if channel in chunk.indexes]
+    if not indexed:
         return []
 
     try:
         file.seek(chunk.offset + RECORD_HEADER_BYTES)
         record = Chunk.read(ReadDataStream(BytesIO(file.read(chunk.end - file.tell()))))
         stream, size = get_chunk_data_stream(record, validate_crc=True)
-        return _at_offsets(stream.read(size), _offsets(file, where), channel)
+        contents = stream.read(size)
+        found: list[Message] = []
+        for channel in indexed:
+            found += _at_offsets(contents, _offsets(file, chunk.indexes[channel]), channel)
+        return found
     except OSError as error:
         raise LogError(f"cannot read {file.name}: {error.strerror}") from None
     except DamageError:
