@@ -18,6 +18,7 @@ VERBS = {
         "cogmap.cli.log.export:export",
         "Write a log for other tools: tables, Foxglove, ROS.",
     ),
+    "import": ("cogmap.cli.log.importing:import_bag", "Make a log of a bag of ROS."),
     "replay": ("cogmap.cli.log.replay:replay", "Play a log onto the bus, or into modules."),
     "diff": ("cogmap.cli.log.inspect:diff", "Compare two logs message by message."),
     "filter": ("cogmap.cli.log.copying:filter_", "Write a part of a log as another log."),
@@ -35,6 +36,7 @@ A first session, while `cogmap run` runs in another terminal:
   cogmap log replay drive.mcap --into sensory
   cogmap log export drive.mcap --csv tables
   cogmap log filter drive.mcap small.mcap -x 'camera|view'
+  cogmap log import drive.bag drive.mcap
   cogmap log summary runs/latest      a run's folder stands for its log
 """
 
