@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from mcap.reader import make_reader
 
-from cogmap.data.bags.recording import BagRecording, read_bag
+from cogmap.data.bags.bag import Bag
+from cogmap.data.bags.pairs import PairRecording, read_pairs
 from cogmap.data.bags.topics import Topics
 from cogmap.errors import UsageError
 from cogmap.recording.exporting.tables import flat
@@ -82,14 +83,14 @@ def lost_in_bag(log: Log, folder: Path) -> int:
     `folder`, or differ, as a recording that is played.
     """
     frames = list({frame.stamp_ns: frame for frame in _all(log, StereoFrame)}.values())
-    bag = read_bag(folder, Topics())
+    bag = read_pairs(Bag(folder), Topics())
     begin_ns = int(bag.stamps_ns[0]) - frames[0].stamp_ns
     pairs = [(frame.stamp_ns, frame.left, frame.right) for frame in frames]
     lost = _differing(pairs, list(_pairs(bag, begin_ns)))
     return lost + _lost_motions(bag, begin_ns, log)
 
 
-def _pairs(bag: BagRecording, begin_ns: int) -> Iterator[tuple[int, Array, Array]]:
+def _pairs(bag: PairRecording, begin_ns: int) -> Iterator[tuple[int, Array, Array]]:
     """Yield the pairs of a bag that can be read."""
     for number, stamp_ns in enumerate(bag.stamps_ns.tolist()):
         try:
@@ -99,7 +100,7 @@ def _pairs(bag: BagRecording, begin_ns: int) -> Iterator[tuple[int, Array, Array
         yield stamp_ns - begin_ns, Array.of(left), Array.of(right)
 
 
-def _lost_motions(bag: BagRecording, begin_ns: int, log: Log) -> int:
+def _lost_motions(bag: PairRecording, begin_ns: int, log: Log) -> int:
     if bag.motions is None:
         return len(list(_all(log, Odometry)))
 
@@ -129,7 +130,9 @@ def _lost_rows(
 ) -> int:
     if not expected.num_rows:
         return 0
-    (path,) = folder.glob(f"{topic.file_stem}.*")
+    path = next(folder.glob(f"{topic.file_stem}.*"), None)
+    if path is None:
+        return int(expected.num_rows)
     found = read(path, expected)
     return _differing(expected.to_pylist(), found.to_pylist())
 

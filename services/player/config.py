@@ -40,6 +40,13 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         str,
         msgspec.Meta(description="Topic of the odometry in a bag. Empty if it has one or none."),
     ] = ""
+    scan_topic: Annotated[
+        str,
+        msgspec.Meta(
+            description="Topic of the laser scans in a bag without a stereo camera. Empty if it "
+            "has one."
+        ),
+    ] = ""
     mount_height_m: Annotated[
         Metres,
         msgspec.Meta(

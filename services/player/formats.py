@@ -28,7 +28,7 @@ class Format(NamedTuple):
 
 FORMATS = {
     "bag": Format(
-        "bag of ROS 1 or 2, or MCAP file of ROS 2: cameras, odometry",
+        "bag of ROS 1 or 2, or MCAP file of ROS 2: cameras or laser, odometry",
         "cogmap.services.player.bags:opened",
     ),
     "kitti": Format(

@@ -22,6 +22,7 @@ BEGIN_NS = 1_700_000_000 * SECOND_NS
 LEFT = "/stereo/left/image_raw"
 RIGHT = "/stereo/right/image_raw"
 ODOMETRY = "/odom"
+SCAN = "/scan"
 WALL = np.random.default_rng(0).integers(0, 256, (HEIGHT, WIDTH), np.uint8)
 
 
@@ -167,6 +168,26 @@ class BagMaker:
             child_frame_id="base_link",
             pose=self.make("geometry_msgs/msg/PoseWithCovariance", **placed),
             twist=self.make("geometry_msgs/msg/TwistWithCovariance", **moving),
+        )
+
+    def scan(
+        self, stamp_ns: int, range_m: Sequence[float], *, frame: str = "", log_ns: int = 0
+    ) -> None:
+        """Write the scan of a laser that turns once around, from behind to the left."""
+        self.write(
+            SCAN,
+            "sensor_msgs/msg/LaserScan",
+            log_ns or stamp_ns,
+            header=self.header(stamp_ns, frame),
+            angle_min=-np.pi,
+            angle_max=np.pi,
+            angle_increment=2 * np.pi / len(range_m),
+            time_increment=0.0,
+            scan_time=0.1,
+            range_min=0.1,
+            range_max=10.0,
+            ranges=np.array(range_m, np.float32),
+            intensities=np.zeros(0, np.float32),
         )
 
     def pose(self, place_m: Sequence[float], turn: Sequence[float]) -> Any:

@@ -1,8 +1,8 @@
-"""Where the cameras of a bag stand on the robot, by its static transforms."""
+"""Where sensors of a bag stand on the robot, by its static transforms."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -13,46 +13,44 @@ from cogmap.geometry.arrays import Floats
 TRANSFORMS = "tf2_msgs/msg/TFMessage"
 STATIC = "/tf_static"
 
-HEIGHT_M = 1.0
-"""Of cameras of which nothing says how high above the ground they are."""
+
+class Mount(NamedTuple):
+    """How a sensor is turned, and where it stands, (3,), in the frame of its robot."""
+
+    turn: Rotation
+    place_m: Floats
+
+    def placed(self, points_m: Floats) -> Floats:
+        """Return (n, 3) points of the sensor's frame in that of the robot."""
+        placed: Floats = self.turn.apply(points_m) + self.place_m
+        return placed
 
 
-def mount_of(bag: Bag, frame: str, height_m: float) -> dict[str, float]:
-    """Return how high above the ground, and how far ahead, a camera's frame is in the frame of its
-    robot, named as Calibration does. `height_m` is what the user says, 0 if nothing.
+def mount_of(bag: Bag, frame: str) -> Mount:
+    """Return where a sensor's frame is in that at the root of the static transforms; where none
+    lead from it, it is the robot's own.
     """
-    placed = _placed(bag, frame)
-    forward_m = 0.0 if placed is None else float(placed[0])
-    above_m = 0.0 if placed is None else float(placed[2])
-    return {
-        "mount_height_m": height_m or max(above_m, 0.0) or HEIGHT_M,
-        "mount_forward_m": forward_m,
-    }
-
-
-def _placed(bag: Bag, frame: str) -> Floats | None:
-    """Return where a frame is in that at the root of the static transforms, (3,); None if there
-    are none that lead from it.
-    """
-    if bag.topics.get(STATIC) != TRANSFORMS:
-        return None
-
     above: dict[str, Any] = {}
-    for message in bag.unstamped(STATIC):
-        above.update({_name(each.child_frame_id): each for each in message.transforms})
+    if bag.topics.get(STATIC) == TRANSFORMS:
+        for message in bag.unstamped(STATIC):
+            above.update({_name(each.child_frame_id): each for each in message.transforms})
 
-    place_m = np.zeros(3)
+    mount = Mount(Rotation.identity(), np.zeros(3))
     name = _name(frame)
-    if name not in above:
-        return None
     while name in above:
         step = above.pop(name)
         name = _name(step.header.frame_id)
-        turn = step.transform.rotation
         moved = step.transform.translation
-        rotation = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w])
-        place_m = rotation.apply(place_m) + np.array([moved.x, moved.y, moved.z])
-    return place_m
+        place_m = np.array([moved.x, moved.y, moved.z])
+        parent = Mount(_rotation(step.transform.rotation), place_m)
+        mount = Mount(parent.turn * mount.turn, parent.placed(mount.place_m))
+    return mount
+
+
+def _rotation(quaternion: Any) -> Rotation:
+    """Return a rotation; none of a quaternion that nobody filled in."""
+    values = np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])
+    return Rotation.from_quat(values) if values.any() else Rotation.identity()
 
 
 def _name(frame: str) -> str:

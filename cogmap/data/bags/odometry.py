@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cogmap.data.bags.bag import Bag
+from cogmap.data.bags.order import in_order
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import wrap_angle
 
@@ -28,6 +30,13 @@ class Motions(NamedTuple):
     stamps_ns: Indices
     rows: Floats
     jumps: int
+
+    @property
+    def notes(self) -> list[str]:
+        """Say what is left out, if anything is."""
+        if not self.jumps:
+            return []
+        return [f"{self.jumps} jumps of the odometry are left out: no wheels move so"]
 
 
 class Poses(NamedTuple):
@@ -67,18 +76,30 @@ class Poses(NamedTuple):
         return np.column_stack([along_m, turned_rad]) / lasts_s[:, None]
 
 
-def poses_of(messages: list[Any], stamps_ns: Indices) -> Poses:
-    """Return the poses and speeds of messages, nav_msgs/Odometry, with those stamps."""
-    return Poses(
-        stamps_ns=stamps_ns,
-        poses=np.array([_pose(each.pose.pose) for each in messages]).reshape(-1, 3),
-        speeds=np.array([_speeds(each.twist.twist) for each in messages]).reshape(-1, 2),
-    )
+def read_odometry(bag: Bag, topic: str) -> tuple[Poses | None, list[str]]:
+    """Return the odometry on a topic, None if it is not two messages, and sentences on what of it
+    is left out. Raises UsageError if stamps are of two clocks.
+    """
+    stamps = []
+    numbers = []
+    for place, message in bag.messages(topic):
+        stamps.append(place.stamp_ns)
+        numbers.append([*_pose(message.pose.pose), *_speeds(message.twist.twist)])
+    rows = np.array(numbers, np.float64).reshape(-1, 5)
 
+    is_finite = np.isfinite(rows).all(axis=1)
+    stamps_ns = np.array(stamps, np.int64)[is_finite]
+    rows = rows[is_finite]
+    notes = []
+    if not is_finite.all():
+        broken = int(np.count_nonzero(~is_finite))
+        notes.append(f"{topic}: {broken} messages with numbers that are not finite are left out")
 
-def is_finite(message: Any) -> bool:
-    """Return whether all numbers of a message, nav_msgs/Odometry, are finite."""
-    return bool(np.isfinite([*_pose(message.pose.pose), *_speeds(message.twist.twist)]).all())
+    order, notes_of_order = in_order(stamps_ns, f"{bag.path}: {topic}")
+    notes += notes_of_order
+    if len(order) < 2:
+        return None, [*notes, f"{topic} has no two messages of odometry, and is left out"]
+    return Poses(stamps_ns[order], rows[order, :3], rows[order, 3:]), notes
 
 
 def _pose(pose: Any) -> tuple[float, float, float]:

@@ -1,4 +1,4 @@
-"""Which topics of a bag are the cameras of a pair, and which one is the odometry."""
+"""Which topics of a bag are the cameras of a pair, odometry, and laser scans."""
 
 from __future__ import annotations
 
@@ -12,31 +12,55 @@ IMAGE = "sensor_msgs/msg/Image"
 COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 ODOMETRY = "nav_msgs/msg/Odometry"
+LASER_SCAN = "sensor_msgs/msg/LaserScan"
 IMAGES = (IMAGE, COMPRESSED_IMAGE)
 SET_PAIR = "name the images by --set player.left_topic=TOPIC --set player.right_topic=TOPIC"
-SET_ODOMETRY = "name one by --set player.odometry_topic=TOPIC"
 
 
 class Topics(NamedTuple):
-    """Topics of a stereo camera's images, and of odometry; empty where they are to be found."""
+    """Topics of a stereo camera's images, of odometry and of laser scans; empty where they are to
+    be found.
+    """
 
     left: str = ""
     right: str = ""
     odometry: str = ""
+    scan: str = ""
 
 
-def chosen(bag: Bag, given: Topics) -> Topics:
-    """Return the topics to read; without odometry, none of it is named.
+def pair_of_topics(bag: Bag, given: Topics) -> tuple[str, str]:
+    """Return the topics of the left and the right camera.
 
     Those that are given are taken; a pair is found by left and right in the names, else by what the
-    cameras say of where they stand. Raises UsageError if a topic is missing or of another type, or
-    if there are several to choose from.
+    cameras say of where they stand. Raises UsageError if a topic is missing or of another type, if
+    there is no pair, or if there are several.
     """
     for name in (given.left, given.right):
         _check(bag, name, IMAGES, SET_PAIR)
-    _check(bag, given.odometry, (ODOMETRY,), SET_ODOMETRY)
-    left, right = _pair(bag, given)
-    return Topics(left, right, given.odometry or _odometry(bag))
+    pairs = _pairs(bag, given)
+    if not pairs:
+        raise bag.wrong("has no pair of topics of images, left and right", SET_PAIR)
+    if len(pairs) > 1:
+        shown = " or ".join(f"{left} and {right}" for left, right in pairs)
+        raise bag.wrong(f"has several pairs of images, {shown}", SET_PAIR)
+    return pairs[0]
+
+
+def has_pair(bag: Bag, given: Topics) -> bool:
+    """Return whether there are topics of a left and a right camera, or some are given."""
+    return bool(given.left or given.right or _pairs(bag, given))
+
+
+def odometry_of(bag: Bag, given: str) -> str:
+    """Return the topic of odometry, empty if there is none. Raises UsageError if the one that is
+    given is missing, or there are several.
+    """
+    return _only(bag, given, ODOMETRY, "--set player.odometry_topic=TOPIC")
+
+
+def scans_of(bag: Bag, given: str) -> str:
+    """Return the topic of laser scans, empty if there is none. Raises as `odometry_of` does."""
+    return _only(bag, given, LASER_SCAN, "--set player.scan_topic=TOPIC")
 
 
 def camera_info(bag: Bag, images: str) -> str:
@@ -70,21 +94,30 @@ def _check(bag: Bag, name: str, kinds: tuple[str, ...], remedy: str) -> None:
         raise bag.wrong(f"has no topic {name} of type {' or '.join(kinds)}", remedy)
 
 
-def _pair(bag: Bag, given: Topics) -> tuple[str, str]:
+def _only(bag: Bag, given: str, kind: str, setting: str) -> str:
+    """Return the topic of a type, empty if there is none."""
+    remedy = f"name one by {setting}"
+    _check(bag, given, (kind,), remedy)
+    found = [given] if given else bag.of_kind(kind)
+    if len(found) > 1:
+        raise bag.wrong(f"has several topics of {kind}, {', '.join(found)}", remedy)
+    return found[0] if found else ""
+
+
+def _pairs(bag: Bag, given: Topics) -> list[tuple[str, str]]:
+    """Return the pairs of topics that may be meant."""
     if given.left and given.right:
-        return given.left, given.right
+        return [(given.left, given.right)]
 
     images = bag.of_kind(*IMAGES)
     pairs = [(left, _other_side(left)) for left in images]
     pairs = [(left, right) for left, right in pairs if right != left and right in images]
     pairs = pairs or _pairs_by_baseline(bag, images)
-    pairs = [pair for pair in pairs if given.left in {"", pair[0]} and given.right in {"", pair[1]}]
-    if not pairs:
-        raise bag.wrong("has no pair of topics of images, left and right", SET_PAIR)
-    if len(pairs) > 1:
-        shown = " or ".join(f"{left} and {right}" for left, right in pairs)
-        raise bag.wrong(f"has several pairs of images, {shown}", SET_PAIR)
-    return pairs[0]
+    return [
+        (left, right)
+        for left, right in pairs
+        if given.left in {"", left} and given.right in {"", right}
+    ]
 
 
 def _other_side(left: str) -> str:
@@ -103,11 +136,3 @@ def _pairs_by_baseline(bag: Bag, images: list[str]) -> list[tuple[str, str]]:
             stands_right = camera_of(bag.first(described)).baseline_m > 0
             shifted[stands_right].append(name)
     return list(product(shifted[False], shifted[True]))
-
-
-def _odometry(bag: Bag) -> str:
-    """Return the topic of odometry, empty if there is none."""
-    found = bag.of_kind(ODOMETRY)
-    if len(found) > 1:
-        raise bag.wrong(f"has several topics of odometry, {' and '.join(found)}", SET_ODOMETRY)
-    return found[0] if found else ""

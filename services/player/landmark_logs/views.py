@@ -43,7 +43,8 @@ POST_M = 0.1
 @dataclass(frozen=True, eq=False)
 class LandmarkLog:
     """The views of a log: at the (n,) `stamps_s`, `percepts` of each, and (k, 5) rows of the
-    `motions` since the view before. Of `surveyed`, landmarks by name, observers alone know.
+    `motions` since the view before. Of `surveyed`, landmarks by name, observers alone know. `rays`
+    are those of each view, (k, 2) rows of bearing_rad and range_m; none if nobody measured any.
     """
 
     stamps_s: Floats
@@ -53,6 +54,7 @@ class LandmarkLog:
     surveyed: dict[str, tuple[float, float]]
     settings: Sections
     notes: Sequence[str] = ()
+    rays: Sequence[Floats] = ()
 
     @cached_property
     def stamps_ns(self) -> list[int]:
@@ -66,12 +68,12 @@ class LandmarkLog:
         return []
 
     def view(self, number: int) -> list[Message]:
-        """Return what was seen, the self-motion until then, and a range scan without rays: nobody
-        measured where it was free.
+        """Return what was seen, the self-motion until then, and a range scan, without rays where
+        nobody measured where it was free.
         """
         stamps_ns = self.stamps_ns
         stamp_ns = stamps_ns[number]
-        none = Array.of(np.zeros(0, np.float32))
+        rays = self.rays[number] if self.rays else np.zeros((0, 2))
         no_points = Array.of(np.zeros((0, 2), np.float32))
         motion = SelfMotion(
             stamp_ns=stamp_ns,
@@ -79,7 +81,12 @@ class LandmarkLog:
             since_ns=stamps_ns[max(0, number - 1)],
             motions=Array.of(self.motions[number]),
         )
-        scan = RangeScan(stamp_ns=stamp_ns, frame=number, bearing_rad=none, range_m=none)
+        scan = RangeScan(
+            stamp_ns=stamp_ns,
+            frame=number,
+            bearing_rad=Array.of(rays[:, 0], "<f4"),
+            range_m=Array.of(rays[:, 1], "<f4"),
+        )
         seen = Percepts(
             stamp_ns=stamp_ns, frame=number, objects=self.percepts[number], road_m=no_points
         )

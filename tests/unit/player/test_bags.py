@@ -11,7 +11,14 @@ from cogmap.recording import open_log
 from cogmap.recording.exporting.rosbag2 import write_rosbag2
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Playback
-from cogmap.schemas.sensing import Odometry, Pose, StereoFrame
+from cogmap.schemas.sensing import (
+    Odometry,
+    Percepts,
+    Pose,
+    RangeScan,
+    SelfMotion,
+    StereoFrame,
+)
 from cogmap.services.player import formats
 from cogmap.services.player.config import Config
 from cogmap.services.player.own_logs import OwnLog
@@ -128,3 +135,37 @@ def test_an_image_that_cannot_be_decoded_is_left_out_and_counted(tmp_path: Path)
     assert isinstance(played, Playback)
     assert (played.views, played.skipped) == (2, 1)
     assert "cannot be decoded" in played.reasons[0]
+
+
+def test_a_laser_without_a_pair_of_cameras_is_played_as_range_scans(tmp_path: Path) -> None:
+    with BagMaker(tmp_path / "bag") as maker:
+        wheels(maker)
+        maker.image("/camera/image_raw", frame_ns(0), bags.WALL)
+        for number in range(4):
+            maker.scan(frame_ns(number), [2.0] * 90)
+
+    recording = _opened(tmp_path / "bag")
+
+    assert len(recording.stamps_ns) == 4
+    motion, scan, percepts = recording.view(1)
+    assert isinstance(motion, SelfMotion)
+    assert isinstance(scan, RangeScan)
+    assert isinstance(percepts, Percepts)
+    rows = motion.motions.numpy()
+    assert rows[:, 0] == pytest.approx(1.0)
+    assert rows[:, 2].sum() == pytest.approx(0.2)
+    assert np.unique(scan.range_m.numpy()).tolist() == [2.0]
+    assert percepts.objects == []
+    assert recording.notes == ["the images on /camera/image_raw are no pair, and are left out"]
+
+
+def test_beside_a_pair_of_cameras_a_laser_is_left_out(tmp_path: Path) -> None:
+    with BagMaker(tmp_path / "bag") as maker:
+        cameras(maker)
+        frames(maker)
+        maker.scan(frame_ns(0), [2.0] * 90)
+
+    recording = _opened(tmp_path / "bag")
+
+    assert isinstance(recording.view(0)[0], StereoFrame)
+    assert recording.notes == ["the scans on /scan are left out: depth gives range scans"]

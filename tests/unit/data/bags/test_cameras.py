@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cogmap.data.bags.bag import Bag
 from cogmap.data.bags.cameras import CameraInfo, pair_of
-from cogmap.data.bags.recording import read_bag
+from cogmap.data.bags.pairs import read_pairs
 from cogmap.data.bags.topics import Topics
 from cogmap.geometry.arrays import Floats
 from tests.support.bags import BagMaker, cameras, frames
@@ -62,7 +63,7 @@ def test_lenses_of_images_that_are_rectified_are_of_no_matter() -> None:
 
 
 def _height_and_forward_m(path: Path, given_m: float = 0.0) -> tuple[float, float]:
-    calibration = read_bag(path, Topics(), given_m).calibration
+    calibration = read_pairs(Bag(path), Topics(), given_m).calibration
     return calibration.mount_height_m, calibration.mount_forward_m
 
 

@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from cogmap.data.bags.bag import Bag
-from cogmap.data.bags.topics import Topics, chosen
+from cogmap.data.bags.topics import Topics, pair_of_topics
 from tests.support import bags
-from tests.support.bags import LEFT, ODOMETRY, RIGHT, BagMaker, cameras, frames, wheels
+from tests.support.bags import LEFT, RIGHT, BagMaker, cameras, frames, wheels
 
 
-def _chosen(path: Path, given: Topics) -> Topics:
-    return chosen(Bag(path), given)
+def _chosen(path: Path, given: Topics) -> tuple[str, str]:
+    return pair_of_topics(Bag(path), given)
 
 
 @pytest.fixture
@@ -29,16 +29,16 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_one_side_that_is_named_tells_the_other(path: Path) -> None:
-    raw = Topics(LEFT, RIGHT, ODOMETRY)
+    raw = (LEFT, RIGHT)
 
     assert _chosen(path, Topics(left=LEFT)) == raw
     assert _chosen(path, Topics(right=RIGHT)) == raw
 
 
 def test_two_topics_that_are_named_are_taken(path: Path) -> None:
-    given = Topics("/stereo/left/image_rect", "/stereo/right/image_rect", ODOMETRY)
+    rectified = ("/stereo/left/image_rect", "/stereo/right/image_rect")
 
-    assert _chosen(path, given) == given
+    assert _chosen(path, Topics(*rectified)) == rectified
 
 
 def test_cameras_without_sides_in_their_names_are_told_by_the_baseline(tmp_path: Path) -> None:
@@ -50,4 +50,4 @@ def test_cameras_without_sides_in_their_names_are_told_by_the_baseline(tmp_path:
 
     topics = _chosen(tmp_path / "bag", Topics())
 
-    assert topics == Topics("/infra1/image_raw", "/infra2/image_raw", "")
+    assert topics == ("/infra1/image_raw", "/infra2/image_raw")

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cogmap.data.bags.recording import BagRecording, read_bag
+from cogmap.data.bags.bag import Bag
+from cogmap.data.bags.pairs import PairRecording, read_pairs
 from cogmap.data.bags.topics import Topics
 from cogmap.errors import UsageError
 from tests.support import bags
@@ -18,11 +19,11 @@ from tests.support.bags import LEFT, RIGHT, SECOND_NS, BagMaker, cameras, frame_
 ANY = Topics()
 
 
-def _read(path: Path, *parts: Callable[[BagMaker], None], ros: int = 2) -> BagRecording:
+def _read(path: Path, *parts: Callable[[BagMaker], None], ros: int = 2) -> PairRecording:
     with BagMaker(path, ros) as maker:
         for part in parts:
             part(maker)
-    return read_bag(path, ANY)
+    return read_pairs(Bag(path), ANY)
 
 
 @pytest.mark.parametrize(("name", "ros"), [("drive.bag", 1), ("drive", 2)])
@@ -47,7 +48,7 @@ def test_pairs_come_with_their_stamps_and_the_calibration(
 def test_a_file_of_mcap_is_read_without_its_folder(tmp_path: Path) -> None:
     _read(tmp_path / "drive", cameras, frames)
 
-    assert len(read_bag(tmp_path / "drive" / "drive.mcap", ANY)) == 4
+    assert len(read_pairs(Bag(tmp_path / "drive" / "drive.mcap"), ANY)) == 4
 
 
 def test_a_bag_of_sqlite_is_read(tmp_path: Path) -> None:
@@ -55,7 +56,7 @@ def test_a_bag_of_sqlite_is_read(tmp_path: Path) -> None:
         cameras(maker)
         frames(maker)
 
-    assert len(read_bag(tmp_path / "drive", ANY)) == 4
+    assert len(read_pairs(Bag(tmp_path / "drive"), ANY)) == 4
 
 
 def test_compressed_images_are_decoded(tmp_path: Path) -> None:
@@ -198,7 +199,7 @@ def _two_pairs(maker: BagMaker) -> None:
         (_fisheye, "the distortion model 'equidistant' is none of plumb_bob"),
         (_at_other_times, "no left and right image whose stamps are within 5 ms"),
         (_odometry_of_another_day, "has no image from the time of its odometry"),
-        (_two_wheels, "topics of odometry, /filtered and /odom.*--set player.odometry_topic="),
+        (_two_wheels, "several topics of nav_msgs/msg/Odometry, /filtered, /odom.*_topic=TOPIC"),
         (_two_pairs, "has several pairs of images, .*image_raw .* or .*image_rect"),
     ],
 )
@@ -225,7 +226,7 @@ def test_topics_that_are_named_and_missing_are_said_with_those_that_there_are(
     _read(tmp_path / "drive", cameras, frames, wheels)
 
     with pytest.raises(UsageError, match=rf"{words}.*it has /odom \(nav_msgs/msg/Odometry\)"):
-        read_bag(tmp_path / "drive", topics)
+        read_pairs(Bag(tmp_path / "drive"), topics)
 
 
 @pytest.mark.parametrize(("name", "ros"), [("drive.bag", 1), ("drive", 2)])
@@ -237,7 +238,7 @@ def test_a_bag_that_was_cut_off_is_said(tmp_path: Path, name: str, ros: int) -> 
     file.write_bytes(content[: len(content) * 2 // 3])
 
     with pytest.raises(UsageError, match="is no whole bag"):
-        read_bag(path, ANY)
+        read_pairs(Bag(path), ANY)
 
 
 def test_a_bag_whose_middle_is_damaged_is_said(tmp_path: Path) -> None:
@@ -248,7 +249,7 @@ def test_a_bag_whose_middle_is_damaged_is_said(tmp_path: Path) -> None:
     file.write_bytes(content)
 
     with pytest.raises(UsageError, match="is no whole bag"):
-        read_bag(tmp_path / "drive", ANY)
+        read_pairs(Bag(tmp_path / "drive"), ANY)
 
 
 def test_a_folder_or_file_that_is_no_bag_is_said(tmp_path: Path) -> None:
@@ -256,7 +257,7 @@ def test_a_folder_or_file_that_is_no_bag_is_said(tmp_path: Path) -> None:
 
     for path in (tmp_path, tmp_path / "notes.txt", tmp_path / "nothing.bag"):
         with pytest.raises(UsageError, match="give a bag of ROS 1, the folder"):
-            read_bag(path, ANY)
+            read_pairs(Bag(path), ANY)
 
 
 def test_without_the_library_the_remedy_is_named(
@@ -265,4 +266,4 @@ def test_without_the_library_the_remedy_is_named(
     monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
 
     with pytest.raises(UsageError, match=r"cogmap\[bags\]"):
-        read_bag(tmp_path, ANY)
+        read_pairs(Bag(tmp_path), ANY)

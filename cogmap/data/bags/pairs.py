@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
@@ -12,9 +11,16 @@ from cogmap.data.bags.bag import Bag, Place
 from cogmap.data.bags.cameras import Pair, camera_of, pair_of
 from cogmap.data.bags.images import image_of
 from cogmap.data.bags.mount import mount_of
-from cogmap.data.bags.odometry import Motions, Poses, is_finite, poses_of
+from cogmap.data.bags.odometry import Motions, Poses, read_odometry
 from cogmap.data.bags.order import in_order
-from cogmap.data.bags.topics import SET_PAIR, Topics, camera_info, chosen
+from cogmap.data.bags.topics import (
+    LASER_SCAN,
+    SET_PAIR,
+    Topics,
+    camera_info,
+    odometry_of,
+    pair_of_topics,
+)
 from cogmap.data.camera_pair import remapped
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Bytes, Indices
@@ -23,19 +29,22 @@ from cogmap.schemas.sensing import Calibration
 SAME_VIEW_NS = 5_000_000
 """The stamps of a pair differ by so much at most: cameras are triggered together."""
 
+HEIGHT_M = 1.0
+"""How high cameras stand of which nothing says it: as high as a hand holds them."""
+
 TRIED = 20
 """A bag of which none of so many pairs can be read is not played."""
 
 
 @dataclass(frozen=True, eq=False)
-class BagRecording:
+class PairRecording:
     """The pairs of a bag, in order of time; those without a right image are None in `right`.
 
     `motions` are None without odometry. `notes` are sentences on what is not played.
     """
 
     bag: Bag
-    topics: Topics
+    topics: tuple[str, str]
     camera: Pair
     left: Sequence[Place]
     right: Sequence[Place | None]
@@ -70,8 +79,8 @@ class BagRecording:
                 f"{SAME_VIEW_NS / 1e6:g} ms: record both cameras"
             )
         images = (
-            self._image(self.topics.left, self.left[number], number),
-            self._image(self.topics.right, right, number),
+            self._image(self.topics[0], self.left[number], number),
+            self._image(self.topics[1], right, number),
         )
         if self.camera.maps is None:
             return images
@@ -89,40 +98,51 @@ class BagRecording:
         return image
 
 
-def read_bag(path: Path, given: Topics, height_m: float = 0.0) -> BagRecording:
-    """Return the pairs of a bag: of ROS 1, of ROS 2, or an MCAP file of ROS 2. What `given` leaves
-    out is found; `height_m` is that of the cameras above the ground, 0 where the bag says it.
+def read_pairs(bag: Bag, given: Topics, height_m: float = 0.0) -> PairRecording:
+    """Return the pairs of a bag. Topics that `given` leaves out are found; `height_m` is that of
+    the cameras above the ground, 0 where the bag says it.
 
     Raises UsageError if it is damaged, has no pair of cameras that were calibrated together, or
     several; if the calibration is of images of another size, these have an unknown encoding, or
     stamps are of two clocks.
     """
-    bag = Bag(path)
-    topics = chosen(bag, given)
-    left_info, right_info = (
-        camera_of(bag.first(camera_info(bag, name))) for name in (topics.left, topics.right)
-    )
-    mount = mount_of(bag, left_info.frame, height_m)
-    is_rectified = all("rect" in name for name in (topics.left, topics.right))
-    camera = pair_of(left_info, right_info, is_rectified, mount, str(path))
-
-    left, notes = _places(bag, topics.left)
-    right, notes_of_right = _places(bag, topics.right)
+    topics = pair_of_topics(bag, given)
+    camera = _camera(bag, topics, height_m)
+    left, notes = _places(bag, topics[0])
+    right, notes_of_right = _places(bag, topics[1])
     notes += notes_of_right
+    for name in bag.of_kind(LASER_SCAN):
+        notes.append(f"the scans on {name} are left out: depth gives range scans")
+
+    wheels = odometry_of(bag, given.odometry)
     motions = None
-    if topics.odometry:
-        odometry, notes_of_odometry = _odometry(bag, topics.odometry)
+    if wheels:
+        odometry, notes_of_odometry = read_odometry(bag, wheels)
         notes += notes_of_odometry
         if odometry is not None:
             every = len(left)
             left = _within(left, odometry, bag)
             motions = odometry.motions(_stamps_ns(left))
-            notes += _notes(every - len(left), motions)
+            notes += motions.notes
+            if every > len(left):
+                outside = every - len(left)
+                notes.append(f"{outside} images from before or after the odometry are left out")
 
     partners = _partners(left, right, bag)
-    recording = BagRecording(bag, topics, camera, left, partners, motions, notes)
+    recording = PairRecording(bag, topics, camera, left, partners, motions, notes)
     _check(recording)
     return recording
+
+
+def _camera(bag: Bag, topics: tuple[str, str], height_m: float) -> Pair:
+    left, right = (camera_of(bag.first(camera_info(bag, name))) for name in topics)
+    place_m = mount_of(bag, left.frame).place_m
+    mount = {
+        "mount_height_m": height_m or max(float(place_m[2]), 0.0) or HEIGHT_M,
+        "mount_forward_m": float(place_m[0]),
+    }
+    is_rectified = all("rect" in name for name in topics)
+    return pair_of(left, right, is_rectified, mount, str(bag.path))
 
 
 def _places(bag: Bag, topic: str) -> tuple[list[Place], list[str]]:
@@ -132,31 +152,6 @@ def _places(bag: Bag, topic: str) -> tuple[list[Place], list[str]]:
         raise bag.wrong(f"has no message on {topic}", SET_PAIR)
     order, notes = in_order(_stamps_ns(found), f"{bag.path}: {topic}")
     return [found[index] for index in order.tolist()], notes
-
-
-def _odometry(bag: Bag, topic: str) -> tuple[Poses | None, list[str]]:
-    """Return the odometry on a topic, None if it is not two messages, and what is left out."""
-    every = list(bag.messages(topic))
-    found = [(place, message) for place, message in every if is_finite(message)]
-    broken = len(every) - len(found)
-    notes = [f"{topic}: {broken} messages without finite numbers are left out"] if broken else []
-
-    stamps_ns = _stamps_ns([place for place, _ in found])
-    order, notes_of_order = in_order(stamps_ns, f"{bag.path}: {topic}")
-    notes += notes_of_order
-    if len(order) < 2:
-        return None, [*notes, f"{topic} has no two messages: the views tell the self-motion"]
-    return poses_of([found[index][1] for index in order.tolist()], stamps_ns[order]), notes
-
-
-def _notes(outside: int, motions: Motions) -> list[str]:
-    """Say what the odometry leaves out, if it does."""
-    notes = []
-    if outside:
-        notes.append(f"{outside} images from before or after the odometry are left out")
-    if motions.jumps:
-        notes.append(f"{motions.jumps} jumps of the odometry are left out: no wheels move so")
-    return notes
 
 
 def _within(left: list[Place], odometry: Poses, bag: Bag) -> list[Place]:
@@ -193,7 +188,7 @@ def _stamps_ns(places: Sequence[Place]) -> Indices:
     return np.array([place.stamp_ns for place in places], np.int64)
 
 
-def _check(recording: BagRecording) -> None:
+def _check(recording: PairRecording) -> None:
     """Raise the error of the first pair if none of the first TRIED can be read."""
     errors = []
     for number in range(min(TRIED, len(recording))):
