@@ -29,6 +29,9 @@ from cogmap.schemas.sensing import Calibration
 SAME_VIEW_NS = 5_000_000
 """The stamps of a pair differ by so much at most: cameras are triggered together."""
 
+RECTIFIED = "image_rect"
+"""In the name of a topic: its images are rectified, as image_proc does it."""
+
 HEIGHT_M = 1.0
 """How high cameras stand of which nothing says it: as high as a hand holds them."""
 
@@ -141,7 +144,7 @@ def _camera(bag: Bag, topics: tuple[str, str], height_m: float) -> Pair:
         "mount_height_m": height_m or max(float(place_m[2]), 0.0) or HEIGHT_M,
         "mount_forward_m": float(place_m[0]),
     }
-    is_rectified = all("rect" in name for name in topics)
+    is_rectified = all(RECTIFIED in name for name in topics)
     return pair_of(left, right, is_rectified, mount, str(bag.path))
 
 

@@ -20,11 +20,7 @@ from cogmap.schemas.cognition import Broadcast
 from cogmap.schemas.graph import Delta
 from cogmap.schemas.nodes import PLAN_ID, ROOT_MAP, Object, PathColumn, PlaceColumn, Plan
 from cogmap.schemas.process import Health
-from cogmap.schemas.sensing import (
-    Odometry,
-    RangeScan,
-    SelfMotion,
-)
+from cogmap.schemas.sensing import Odometry, RangeScan, SelfMotion
 from cogmap.schemas.topics import Topic
 
 MAP_PERIOD_S = 1.0
@@ -47,8 +43,8 @@ class Sentence(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Map:
-    """The map as it is now: the path and the planned route, (n, 2) each, `plan` None without a
-    route, the objects, and PLACE_COLUMNS of the place nodes, `cell_m` apart.
+    """The map as it is now: the path and the plan, (n, 2) each, None without a route, the objects,
+    and PLACE_COLUMNS of the place nodes, `cell_m` apart.
     """
 
     path_m: Floats
@@ -135,11 +131,11 @@ class _Drive:
     def _of_self_motion(self, motion: SelfMotion) -> Iterator[Moment]:
         """Yield each motion between two views as odometry: the last one ends at the second."""
         rows = motion.motions.numpy()
-        left_s = np.cumsum(rows[::-1, 2])[::-1] - rows[:, 2]
-        for row, before_end_s in zip(rows.tolist(), left_s.tolist(), strict=True):
+        before_end_s = np.cumsum(rows[::-1, 2])[::-1] - rows[:, 2]
+        for row, rest_s in zip(rows.tolist(), before_end_s.tolist(), strict=True):
             speed_m_s, turn_rate_rad_s, dt_s, *_ = row
             moved = Odometry(
-                stamp_ns=max(0, motion.stamp_ns - round(before_end_s * 1e9)),
+                stamp_ns=max(0, motion.stamp_ns - round(rest_s * 1e9)),
                 speed_m_s=speed_m_s,
                 turn_rate_rad_s=turn_rate_rad_s,
                 dt_s=dt_s,

@@ -32,6 +32,24 @@ def turned(heading_rad: float) -> Quaternion:
     return 0.0, 0.0, math.sin(half_rad), math.cos(half_rad)
 
 
+def latched() -> Any:
+    """Return the quality of service by which late subscribers get the last message, too."""
+    from rosbags import interfaces as ros
+
+    never = ros.QosTime(2147483647, 4294967295)
+    return ros.Qos(
+        history=ros.QosHistory.KEEP_LAST,
+        depth=1,
+        reliability=ros.QosReliability.RELIABLE,
+        durability=ros.QosDurability.TRANSIENT_LOCAL,
+        deadline=never,
+        lifespan=never,
+        liveliness=ros.QosLiveliness.AUTOMATIC,
+        liveliness_lease_duration=never,
+        avoid_ros_namespace_conventions=False,
+    )
+
+
 class RosMessages:
     """Makes messages by the classes of `store`, a type store of rosbags."""
 

@@ -27,6 +27,7 @@ from cogmap.recording.exporting.ros_messages import (
     Position,
     Quaternion,
     RosMessages,
+    latched,
     turned,
 )
 from cogmap.recording.log import Log
@@ -123,7 +124,7 @@ class _Drive:
         kind = message.__msgtype__
         connection = self._connections.get(topic)
         if connection is None:
-            quality = [_latched()] if topic in LATCHED else []
+            quality = [latched()] if topic in LATCHED else []
             connection = self._writer.add_connection(
                 topic, kind, typestore=self._store, offered_qos_profiles=quality
             )
@@ -283,24 +284,6 @@ def _arc(moved: Odometry) -> Floats:
     half_rad = moved.turn_rate_rad_s * moved.dt_s / 2
     chord_m = moved.speed_m_s * moved.dt_s * np.sinc(half_rad / np.pi)
     return np.array([chord_m * np.cos(half_rad), chord_m * np.sin(half_rad), 2 * half_rad])
-
-
-def _latched() -> Any:
-    """Return the quality of service by which late subscribers get the last message, too."""
-    from rosbags import interfaces as ros
-
-    never = ros.QosTime(2147483647, 4294967295)
-    return ros.Qos(
-        history=ros.QosHistory.KEEP_LAST,
-        depth=1,
-        reliability=ros.QosReliability.RELIABLE,
-        durability=ros.QosDurability.TRANSIENT_LOCAL,
-        deadline=never,
-        lifespan=never,
-        liveliness=ros.QosLiveliness.AUTOMATIC,
-        liveliness_lease_duration=never,
-        avoid_ros_namespace_conventions=False,
-    )
 
 
 def _library() -> Any:

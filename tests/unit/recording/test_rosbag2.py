@@ -22,6 +22,8 @@ from cogmap.recording.exporting.rosbag2 import write_rosbag2
 from cogmap.schemas import topics
 from cogmap.schemas.nodes import ROOT_MAP, Object
 from cogmap.schemas.sensing import Odometry, StereoFrame, View
+from cogmap.testing import self_motion
+from tests.support.logs import write_log
 from tests.support.reference import REFERENCE
 
 Messages = dict[str, list[Any]]
@@ -36,14 +38,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return written
 
 
-@pytest.fixture(scope="module")
-def messages(folder: Path) -> Messages:
-    """The messages of the bag by topic, as rosbags reads them."""
+def _read(folder: Path) -> Messages:
+    """The messages of a bag by topic, as rosbags reads them."""
     found = defaultdict(list)
     with AnyReader([folder]) as reader:
         for connection, _, content in reader.messages():
             found[connection.topic].append(reader.deserialize(content, connection.msgtype))
     return found
+
+
+@pytest.fixture(scope="module")
+def messages(folder: Path) -> Messages:
+    return _read(folder)
 
 
 @pytest.fixture(scope="module")
@@ -113,6 +119,19 @@ def test_odometry_leads_where_the_wheels_did(messages: Messages) -> None:
     turned_rad = 2 * math.atan2(last.pose.pose.orientation.z, last.pose.pose.orientation.w)
     assert turned_rad == pytest.approx(sum(each.turn_rate_rad_s * each.dt_s for each in driven))
     assert last.twist.twist.linear.x == driven[-1].speed_m_s
+
+
+def test_without_wheels_the_odometry_is_what_the_views_tell(tmp_path: Path) -> None:
+    steps = [(1.0, 0.0, 0.1, 0.1, 0.1), (3.0, 0.0, 0.1, 0.1, 0.1)]
+    told = [self_motion(frame, steps) for frame in (1, 2)]
+    log = write_log(tmp_path / "log.mcap", [(each.stamp_ns, each) for each in told])
+
+    write_rosbag2(open_log(log), tmp_path / "bag")
+
+    moved = _read(tmp_path / "bag")["/odom"]
+    assert [each.pose.pose.position.x for each in moved] == pytest.approx([0, 0.1, 0.4, 0.5, 0.8])
+    stamps_ns = [10**9 * each.header.stamp.sec + each.header.stamp.nanosec for each in moved]
+    assert np.diff(stamps_ns).tolist() == [10**8] * 4
 
 
 def _planar(transform: Any) -> list[float]:
