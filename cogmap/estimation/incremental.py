@@ -82,13 +82,16 @@ class IncrementalSolver:
         """
         roots = sqrt_information(closures.information)
         columns = []
+        rows = []
         for number, root in enumerate(roots):
-            of_closure, _ = self._columns(closures.select(np.array([number])), root)
+            of_closure, of_ends = self._columns(closures.select(np.array([number])), root)
             columns.append(of_closure)
+            rows.append(of_ends)
 
         joined = np.hstack(columns)
-        everywhere = np.arange(len(joined))
-        leverage = joined.T @ self._solve(joined, everywhere)
+        used = np.unique(np.concatenate(rows))
+        solved = self._solve(joined, used)
+        leverage = joined[used].T @ solved[used]
 
         residual = residuals(self.graph.poses, closures)
         whitened = matvec(roots.mT, residual).reshape(-1)
