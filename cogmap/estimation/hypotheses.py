@@ -15,9 +15,18 @@ import numpy as np
 from scipy.spatial import KDTree
 from scipy.special import chdtri
 
+from cogmap.estimation.covariance import joint_covariances
 from cogmap.estimation.incremental import IncrementalSolver
 from cogmap.estimation.least_squares import optimize
-from cogmap.estimation.pose_graph import Constraints, PoseGraph, cost
+from cogmap.estimation.pose_graph import (
+    Constraints,
+    PoseGraph,
+    cost,
+    jacobians,
+    matvec,
+    residuals,
+    sqrt_information,
+)
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 
 # In places of the path, at either end of a closure.
@@ -90,7 +99,7 @@ class Hypotheses:
             factor = self._variance_factor(solver, remaining)
             before = remaining
             not_contradicted = 0
-            for members in _by_doubt(solver, np.flatnonzero(remaining)):
+            for members in _by_doubt(solver.graph, np.flatnonzero(remaining)):
                 others = remaining.copy()
                 others[members] = False
 
@@ -160,23 +169,47 @@ def _sizes(groups: list[list[int]]) -> Floats:
     return np.array(sizes, np.float64)
 
 
-def _by_doubt(solver: IncrementalSolver, numbers: Indices) -> list[Indices]:
-    """Sort the hypotheses among a solver's closures, whose `numbers` (k,) are given: first comes
-    the one that all others predict the least, linearly.
+def _by_doubt(graph: PoseGraph, numbers: Indices) -> list[Indices]:
+    """Sort the hypotheses among the closures of an optimized graph, whose `numbers` (k,) are given:
+    first comes the one that all others predict the least, linearly.
     """
-    closures = solver.graph.closures
-    hypotheses: list[Indices] = []
-    doubts: list[float] = []
-
+    groups: list[Indices] = []
     is_listed = np.zeros(len(numbers), bool)
-    for index, group in enumerate(_alike(closures)):
+    for index, group in enumerate(_alike(graph.closures)):
         if is_listed[index]:
             continue
 
         members = np.array(group)
         is_listed[members] = True
-        hypotheses.append(numbers[members])
-        doubts.append(solver.chi_square_without(closures.select(members)))
+        groups.append(members)
 
-    order = np.argsort(-np.array(doubts), kind="stable")
-    return [hypotheses[index] for index in order.tolist()]
+    order = np.argsort(-_chi_squares_without(graph, groups), kind="stable")
+    return [numbers[groups[index]] for index in order.tolist()]
+
+
+def _chi_squares_without(graph: PoseGraph, groups: list[Indices]) -> Floats:
+    """Return the squared Mahalanobis distance of each group of an optimized graph's closures, taken
+    together, from what all others predict of them, (n,).
+    """
+    closures = graph.closures
+    roots = sqrt_information(closures.information)
+    by_i, by_j = jacobians(graph.poses, closures)
+    whitened = matvec(roots.mT, residuals(graph.poses, closures))
+    whitened_i = roots.mT @ by_i
+    whitened_j = roots.mT @ by_j
+
+    ends = [np.unique([closures.i[members], closures.j[members]]) for members in groups]
+    found = np.zeros(len(groups))
+    covariances = joint_covariances(graph, ends)
+    for number, (members, poses) in enumerate(zip(groups, ends, strict=True)):
+        rows = np.arange(len(members))
+        by_poses = np.zeros((len(members), 3, len(poses), 3))
+        by_poses[rows, :, np.searchsorted(poses, closures.i[members])] = whitened_i[members]
+        by_poses[rows, :, np.searchsorted(poses, closures.j[members])] += whitened_j[members]
+
+        joined = by_poses.reshape(3 * len(members), 3 * len(poses))
+        leverage = joined @ covariances[number] @ joined.T
+        misfit = whitened[members].ravel()
+        is_free = np.eye(len(misfit)) - leverage
+        found[number] = misfit @ np.linalg.solve(is_free, misfit)
+    return found

@@ -18,7 +18,6 @@ from cogmap.estimation.pose_graph import (
     PoseGraph,
     cost,
     jacobians,
-    matvec,
     residuals,
     sqrt_information,
 )
@@ -75,28 +74,6 @@ class IncrementalSolver:
     def chi_square(self, closure: Constraints) -> float:
         """Return one closure's squared Mahalanobis distance from what the others predict of it."""
         return self._update(closure).chi_square
-
-    def chi_square_without(self, closures: Constraints) -> float:
-        """Return the squared Mahalanobis distance of closures that are already in, taken together,
-        from what all others predict of them.
-        """
-        roots = sqrt_information(closures.information)
-        columns = []
-        rows = []
-        for number, root in enumerate(roots):
-            of_closure, of_ends = self._columns(closures.select(np.array([number])), root)
-            columns.append(of_closure)
-            rows.append(of_ends)
-
-        joined = np.hstack(columns)
-        used = np.unique(np.concatenate(rows))
-        solved = self._solve(joined, used)
-        leverage = joined[used].T @ solved[used]
-
-        residual = residuals(self.graph.poses, closures)
-        whitened = matvec(roots.mT, residual).reshape(-1)
-        is_free = np.eye(len(whitened)) - leverage
-        return float(whitened @ np.linalg.solve(is_free, whitened))
 
     def add(self, closure: Constraints) -> Floats:
         """Take in one more closure. Returns the (n, 3) poses after it."""

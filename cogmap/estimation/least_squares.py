@@ -47,7 +47,7 @@ class NormalEquations:
     def __init__(self, count: int, constraints: Constraints) -> None:
         unknown_poses = count - 1
         self.unknown_count = 3 * unknown_poses
-        self._order = _elimination_order(count, constraints)
+        self._order = elimination_order(count, constraints.i, constraints.j)
         self._position = np.full(count, -1)
         self._position[self._order] = np.arange(unknown_poses)
 
@@ -137,9 +137,11 @@ class _BlockPattern:
         return sparse.csc_matrix(columns, shape=self._shape)
 
 
-def _elimination_order(count: int, constraints: Constraints) -> Indices:
-    """Order the poses but the first so that the factors have little fill (minimum degree)."""
-    joined = adjacency(constraints.i, constraints.j, count)
+def elimination_order(count: int, one: Indices, other: Indices) -> Indices:
+    """Order `count` poses, (m,) pairs of which are joined, but the first so that the factors have
+    little fill (minimum degree).
+    """
+    joined = adjacency(one, other, count)
     pattern = joined[1:, 1:]
     pattern.data[:] = 1.0
 
