@@ -48,6 +48,7 @@ VERBS = {
     "schemes": ("cogmap.cli.schemes:schemes", "Write the guidance schemes learned on a drive."),
     "street": ("cogmap.cli.street:street", "List, close and open streets of the town."),
     "sweep": ("cogmap.cli.sweep.command:sweep_command", "Drive with many seeds and settings."),
+    "teleop": ("cogmap.cli.teleop:teleop", "Drive the robot by keys, in the place of motor."),
     "time": ("cogmap.cli.pausing:time_", "Let simulated time stand, go on by views, and pass."),
     "topic": ("cogmap.cli.topic.command:topic", "Watch topics of a running system; publish."),
     "train": ("cogmap.training.command:train", "Train the networks of perception."),

@@ -68,7 +68,7 @@ def test_bag_is_another_name_of_log() -> None:
 @pytest.mark.parametrize(
     ("arguments", "meant"),
     [
-        (["topi", "list"], "topic"),
+        (["stret", "list"], "street"),
         (["topic", "ech"], "echo"),
         (["log", "inf"], "info"),
         (["experiment", "city-map"], "city-maps"),
