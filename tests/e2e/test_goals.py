@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from cogmap.bus.session import free_endpoint
-from tests.support.system.runs import COGMAP, DRIVING, TIMEOUT_S, Run
+from tests.support.system.runs import DRIVING, Run, answered
 
 PERCEPTS = (
     "--lockstep",
@@ -18,17 +17,6 @@ PERCEPTS = (
     *("--set", "sim.sensing=percepts"),
     *("--set", "sim.town_size_m=120"),
 )
-
-
-def _goal(endpoint: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """`cogmap goal` at an endpoint."""
-    return subprocess.run(
-        [*COGMAP, "goal", *arguments, "--connect", endpoint],
-        capture_output=True,
-        text=True,
-        timeout=TIMEOUT_S,
-        check=False,
-    )
 
 
 @pytest.fixture
@@ -53,7 +41,7 @@ def test_a_run_ends_when_the_agent_was_at_every_goal(
 def test_a_goal_given_to_a_running_system_is_planned(start: Callable[..., Run]) -> None:
     run = start(*PERCEPTS)
     run.wait_for(DRIVING)
-    given = _goal(run.endpoint, "-25", "0", "--json", "--wait", "30")
+    given = answered("goal", run.endpoint, "-25", "0", "--json", "--wait", "30")
 
     assert given.returncode == 0, given.stderr
     plan = json.loads(given.stdout)
@@ -66,14 +54,14 @@ def test_a_goal_that_nobody_knows_is_said_and_the_command_fails(
 ) -> None:
     run = start(*PERCEPTS)
     run.wait_for(DRIVING)
-    given = _goal(run.endpoint, "harbour", "--wait", "30")
+    given = answered("goal", run.endpoint, "harbour", "--wait", "30")
 
     assert given.returncode == 1
     assert given.stdout == "harbour: the map has no object of that name\n"
 
 
 def test_without_a_system_the_remedy_is_named() -> None:
-    given = _goal(free_endpoint(), "bakery", "--wait", "1")
+    given = answered("goal", free_endpoint(), "bakery", "--wait", "1")
 
     assert given.returncode != 0
     assert "cogmap run" in given.stderr

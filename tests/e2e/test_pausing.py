@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 from collections.abc import Callable
 
 from cogmap.bus.codec import decode
@@ -12,7 +11,7 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.schemas import topics
 from cogmap.schemas.sensing import Percepts
 from tests.support.system.processes import wait_until
-from tests.support.system.runs import COGMAP, DRIVING, TIMEOUT_S, Run
+from tests.support.system.runs import DRIVING, Run, answered
 
 PERCEPTS = (
     "--lockstep",
@@ -20,17 +19,6 @@ PERCEPTS = (
     *("--set", "sim.sensing=percepts"),
     *("--set", "sim.town_size_m=120"),
 )
-
-
-def _time(endpoint: str, *arguments: str) -> subprocess.CompletedProcess[str]:
-    """`cogmap time` at an endpoint."""
-    return subprocess.run(
-        [*COGMAP, "time", *arguments, "--connect", endpoint],
-        capture_output=True,
-        text=True,
-        timeout=TIMEOUT_S,
-        check=False,
-    )
 
 
 def test_a_drive_stands_goes_on_by_views_and_goes_on(start: Callable[..., Run]) -> None:
@@ -46,18 +34,18 @@ def test_a_drive_stands_goes_on_by_views_and_goes_on(start: Callable[..., Run]) 
     bus = ZenohBus(run.endpoint, "agent")
     bus.subscribe(topics.PERCEPTS, receive, lambda _topic, _number: None)
 
-    assert "time stands" in _time(run.endpoint, "pause").stdout
+    assert "time stands" in answered("time", run.endpoint, "pause").stdout
     before = len(frames)
-    assert "views to come: 3" in _time(run.endpoint, "step", "3").stdout
+    assert "views to come: 3" in answered("time", run.endpoint, "step", "3").stdout
     wait_until(lambda: len(frames) == before + 3, "three views have come")
-    assert "time passes" in _time(run.endpoint, "resume").stdout
+    assert "time passes" in answered("time", run.endpoint, "resume").stdout
     wait_until(lambda: len(frames) > before + 10, "views come again")
     bus.close()
     run.close()
 
 
 def test_where_nothing_runs_the_remedy_is_said() -> None:
-    refused = _time(free_endpoint(), "pause")
+    refused = answered("time", free_endpoint(), "pause")
 
     assert refused.returncode == 2
     assert "cogmap run" in refused.stderr

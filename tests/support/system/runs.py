@@ -47,6 +47,17 @@ def wait_until(condition: Callable[[], bool], what: str) -> None:
     processes.wait_until(condition, what, TIMEOUT_S)
 
 
+def answered(verb: str, endpoint: str, *arguments: str) -> subprocess.CompletedProcess[str]:
+    """A verb of `cogmap` at an endpoint, once it has ended."""
+    return subprocess.run(
+        [*COGMAP, verb, *arguments, "--connect", endpoint],
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT_S,
+        check=False,
+    )
+
+
 class Run:
     """A `cogmap run` in a new folder, without a terminal."""
 

@@ -52,8 +52,10 @@ def test_a_key_leads_where_it_lies(key: str, ahead: int, left: int) -> None:
     assert speed_rad_s * WHEEL_RADIUS_M == pytest.approx(2.0 * ahead)
 
 
-@pytest.mark.parametrize("command", [pressed("i", "k"), pressed("i", after_ns=HELD_NS), pressed()])
-def test_the_robot_stands_without_a_key(command: MotorCommand) -> None:
+@pytest.mark.parametrize(("keys", "after_ns"), [(["i", "k"], 0), (["i"], HELD_NS), ([], 0)])
+def test_the_robot_stands_without_a_key(keys: list[str], after_ns: int) -> None:
+    command = pressed(*keys, after_ns=after_ns)
+
     assert (command.left_wheel_rad_s, command.right_wheel_rad_s) == (0.0, 0.0)
 
 
