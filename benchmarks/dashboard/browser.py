@@ -18,8 +18,14 @@ ARGUMENTS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-backg
 
 
 @contextmanager
-def browser(width_px: int = 1200, height_px: int = 1000, scheme: str = "light") -> Iterator[Chrome]:
-    """Open a browser that prefers a colour scheme. Raises UsageError if there is none."""
+def browser(
+    width_px: int = 1200, height_px: int = 1000, scheme: str = "light", logs: bool = True
+) -> Iterator[Chrome]:
+    """Open a browser that prefers a colour scheme. Raises UsageError if there is none.
+
+    One that `logs` hands all that its page receives on once more, for `foreign_requests`: that
+    costs as much as the page itself.
+    """
     driver = shutil.which("chromedriver")
     chromium = shutil.which("chromium")
     if driver is None or chromium is None:
@@ -29,7 +35,8 @@ def browser(width_px: int = 1200, height_px: int = 1000, scheme: str = "light") 
     options.binary_location = chromium
     for argument in ARGUMENTS:
         options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    if logs:
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
     opened = Chrome(options=options, service=Service(driver))
     try:
         # A window is at least 500 px wide; what a page believes may be narrower.

@@ -35,19 +35,18 @@ def measure(setting: Setting, source: Path | None = None) -> Metrics:
     any moment of a log is shown.
 
     Drives a lap with cameras in real time, once alone and once with the dashboard in three headless
-    browsers, one of which notes when it shows each frame. Then a slider is moved to a hundred
-    moments of a log of ten minutes, which is driven in lockstep, at the level of percepts. Takes
-    about ten minutes, and Debian's chromium and chromium-driver.
+    browsers, which are open before, and one of which notes when it shows each frame. Then a slider
+    is moved to a hundred moments of a log of ten minutes, which is driven in lockstep, at the level
+    of percepts. Takes about ten minutes, and Debian's chromium and chromium-driver.
     """
     announce = setting.announce
-    with browser():
+    with browser():  # says at once where there is none
         announce("driving a lap alone")
     alone = Driven(setting.folder / "alone")
     alone.end()
 
     announce(f"driving a lap, watched in {BROWSERS} browsers")
-    watched = Driven(setting.folder / "watched", "--dashboard")
-    shown_ms, foreign = frames_shown_ms(watched, BROWSERS)
+    shown_ms, foreign, watched = frames_shown_ms(setting.folder / "watched", BROWSERS)
 
     if source is None:
         announce("driving ten minutes in lockstep")

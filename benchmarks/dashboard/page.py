@@ -20,6 +20,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.sensing import View
 
 MOMENTS = 100
+LOOK_AGAIN_S = 5.0
 SERVES_S = 60.0
 # Notes each frame with the time at which the page has shown its image.
 NOTE_FRAMES = """
@@ -45,16 +46,22 @@ function look() {
 }
 look();
 """
+# What the page has asked other hosts for, so far.
+FOREIGN = """
+return performance.getEntriesByType('resource').map((each) => each.name)
+  .filter((name) => /^(http|ws)/.test(name) && new URL(name).host !== location.host);
+"""
 IS_READ = "return !document.getElementById('clock').textContent.includes('% read')"
 
 
-def frames_shown_ms(driven: Driven, browsers: int) -> tuple[list[float], int]:
-    """Watch a drive in so many browsers until it ends. Returns how long after its sensing each
-    frame was on the page of the first, and how many requests went to other hosts.
+def frames_shown_ms(folder: Path, browsers: int) -> tuple[list[float], int, Driven]:
+    """Drive, and watch it in so many browsers until it ends. Returns how long after its sensing
+    each frame was on the page of the first, how many requests went to other hosts, and the drive.
     """
-    address = driven.address()
     with ExitStack() as opened:
-        pages = [opened.enter_context(browser()) for _ in range(browsers)]
+        pages = [opened.enter_context(browser(logs=False)) for _ in range(browsers)]
+        driven = Driven(folder, "--dashboard")
+        address = driven.address()
         for page in pages:
             page.get(address)
         pages[0].execute_script(NOTE_FRAMES)
@@ -63,9 +70,8 @@ def frames_shown_ms(driven: Driven, browsers: int) -> tuple[list[float], int]:
         foreign = 0
         while driven.is_running():
             noted = pages[0].execute_script("return window.noted")
-            for page in pages:
-                foreign += len(foreign_requests(page, urlsplit(address).netloc))
-            time.sleep(1.0)
+            foreign = sum(len(page.execute_script(FOREIGN)) for page in pages)
+            time.sleep(LOOK_AGAIN_S)
     driven.end()
 
     born_ns = {}
@@ -76,7 +82,7 @@ def frames_shown_ms(driven: Driven, browsers: int) -> tuple[list[float], int]:
     shown_ms = [at_ms - born_ns[frame] / 1e6 for frame, at_ms in noted if frame in born_ns]
     if not shown_ms:
         raise CogmapError("no frame was on the page: see what `cogmap dashboard` says")
-    return shown_ms, foreign
+    return shown_ms, foreign, driven
 
 
 def slider_ms(log: Path) -> tuple[list[float], int]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.cli.dashboard.parts import (
+    Cuts,
     District,
     Flat,
     Layer,
@@ -15,6 +16,7 @@ from cogmap.cli.dashboard.parts import (
     Truth,
     flat,
 )
+from cogmap.cli.dashboard.pictures import PNG, costs_png, data_url, places_png
 from cogmap.cli.launch.goals import name_of
 from cogmap.geometry import se2
 from cogmap.geometry.arrays import Floats
@@ -23,6 +25,7 @@ from cogmap.graph.cuts import cut_links_m
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import called
 from cogmap.graph.path import rows_of
+from cogmap.graph.window import Extent
 from cogmap.schemas.nodes import (
     NEVER_NS,
     PLAN_ID,
@@ -37,6 +40,7 @@ from cogmap.schemas.nodes import (
     is_coarse_map,
 )
 from cogmap.schemas.sensing import Building, Pose, TrueTown
+from cogmap.services.codelets.public import PlanningConfig, place_costs
 
 MAX_SAMPLES = 24
 """Samples of an object's place that are drawn: enough to see their spread."""
@@ -44,31 +48,51 @@ MAX_SAMPLES = 24
 SPREADS = 2.0
 
 
-def map_part(graph: Graph, version: int) -> MapPart:
-    """Return the root map of `graph` as it is drawn; `version` is that of its picture of places."""
+def map_part(graph: Graph) -> MapPart:
+    """Return the root map of `graph` as it is drawn."""
     rows = rows_of(graph.path)
     return MapPart(
-        layer=_layer(graph, version),
         objects=[_object(node) for node in graph.of_kind(Object) if node.map == ROOT_MAP],
         path=flat(rows[:, [PathColumn.X_M, PathColumn.Y_M]]),
         closures=flat(_closures_m(graph, rows)),
-        cuts=flat(cut_links_m(graph)),
         districts=_districts(graph),
         goals=_goals(graph),
         route=_route(graph),
     )
 
 
-def _layer(graph: Graph, version: int) -> Layer | None:
-    extent = graph.places.extent(ROOT_MAP)
-    width, height = extent.shape
-    if not width:
-        return None
+def cuts_part(graph: Graph) -> Cuts:
+    """Return the links that are cut on the root map."""
+    return Cuts(links=flat(cut_links_m(graph)))
 
-    cell_m = graph.cell_m()
+
+def places_part(graph: Graph) -> Layer:
+    """Return the place nodes of the root map as a picture."""
+    extent = graph.places.extent(ROOT_MAP)
+    return _layer(extent, graph.cell_m(), places_png(graph)) if extent.shape[0] else Layer()
+
+
+def costs_part(graph: Graph, planning: PlanningConfig) -> Layer:
+    """Return what it costs to drive over the places of the root map, by the settings `planning`,
+    as a picture.
+    """
+    agent = graph.agent
+    if agent is None or agent.map != ROOT_MAP or not graph.places.extent(ROOT_MAP).shape[0]:
+        return Layer()
+
+    costs = place_costs(graph, agent, planning)
+    cost = costs.cost()
+    west, south = costs.grid.origin
+    width, height = cost.shape
+    extent = Extent((west, south), (west + width, south + height))
+    return _layer(extent, costs.grid.cell_m, costs_png(cost))
+
+
+def _layer(extent: Extent, cell_m: float, png: bytes) -> Layer:
     west, south = extent.lower
+    width, height = extent.shape
     return Layer(
-        version=version,
+        picture=data_url(PNG, png),
         west_m=(west - 0.5) * cell_m,
         south_m=(south - 0.5) * cell_m,
         width_m=width * cell_m,
@@ -139,28 +163,22 @@ def _route(graph: Graph) -> Flat:
 def truth_part(
     town: TrueTown | None, start: Pose | None, path_m: list[tuple[float, float]]
 ) -> Truth:
-    """Return the true town in the frame of the map, which is that of the true pose `start`; the
-    names of its streets alone where that is not known.
+    """Return the true town in the frame of the map, which is that of the true pose `start`; nothing
+    where that is not known.
     """
-    truth = Truth()
-    if town is None:
-        return truth
+    if town is None or start is None:
+        return Truth()
 
-    origin = None
-    if start is not None:
-        origin = np.array([start.x_m, start.y_m, start.heading_rad])
+    origin = np.array([start.x_m, start.y_m, start.heading_rad])
+    truth = Truth(path=flat(se2.transform_to(origin, np.array(path_m).reshape(-1, 2))))
     for street in town.streets:
-        line = []
-        if origin is not None:
-            line = flat(se2.transform_to(origin, np.array(street.line_m)))
-        truth.streets.append(TrueStreet(name=street.name, line=line, is_closed=street.closed))
+        line = flat(se2.transform_to(origin, np.array(street.line_m)))
+        truth.streets.append(TrueStreet(line=line, is_closed=street.closed))
 
-    if origin is not None:
-        corners_m = [_corners_m(building) for building in town.buildings]
-        ends = np.cumsum([len(each) for each in corners_m])
-        on_map_m = se2.transform_to(origin, np.vstack([np.zeros((0, 2)), *corners_m]))
-        truth.buildings = [flat(each) for each in np.split(on_map_m, ends)[:-1]]
-        truth.path = flat(se2.transform_to(origin, np.array(path_m).reshape(-1, 2)))
+    corners_m = [_corners_m(building) for building in town.buildings]
+    ends = np.cumsum([len(each) for each in corners_m])
+    on_map_m = se2.transform_to(origin, np.vstack([np.zeros((0, 2)), *corners_m]))
+    truth.buildings = [flat(each) for each in np.split(on_map_m, ends)[:-1]]
     return truth
 
 

@@ -31,6 +31,7 @@ from cogmap.schemas.nodes import Goal, Object, goal_id
 from cogmap.schemas.process import Pause
 from cogmap.schemas.sensing import StreetClosure
 from cogmap.schemas.topics import Topic
+from cogmap.services.codelets.public import PlanningConfig
 from cogmap.services.global_workspace.config import Config
 
 DASHBOARD = "dashboard"
@@ -167,7 +168,7 @@ def _nowhere(_request: SnapshotRequest) -> Fetched:
 
 
 def _scene(replica: Replica, label: str) -> Scene:
-    return Scene(replica.graph, replica.follow, Config(), Path(label))
+    return Scene(replica.graph, replica.follow, Config(), PlanningConfig(), Path(label))
 
 
 def message_for(wish: Wish, graph: Graph) -> tuple[Message, str]:

@@ -18,11 +18,20 @@ class PartName(enum.StrEnum):
 
     NOW = "now"
     MAP = "map"
+    PLACES = "places"
+    COSTS = "costs"
+    CUTS = "cuts"
     CAMERA = "camera"
+    DEPTH = "depth"
     MIND = "mind"
     SYSTEM = "system"
     TOPICS = "topics"
+    STREETS = "streets"
     TRUTH = "truth"
+
+
+ASKED_FOR = frozenset((PartName.COSTS, PartName.CUTS, PartName.TRUTH))
+"""Layers of the map that are large, and that few look at: a browser gets those that it shows."""
 
 
 class Part(msgspec.Struct, kw_only=True):
@@ -76,28 +85,32 @@ class District(Part, kw_only=True):
 
 
 class Layer(Part, kw_only=True):
-    """A picture of place nodes: `version` is in its address, `west_m` and `south_m` is where its
+    """A picture of place nodes, empty where there are none: `west_m` and `south_m` is where its
     corner lies.
     """
 
-    version: int
-    west_m: float
-    south_m: float
-    width_m: float
-    height_m: float
+    picture: str = ""
+    west_m: float = 0.0
+    south_m: float = 0.0
+    width_m: float = 0.0
+    height_m: float = 0.0
 
 
 class MapPart(Part, kw_only=True):
     """The learned map, in its own frame: the origin is where the agent began."""
 
-    layer: Layer | None = None
     objects: list[MapObject] = []
     path: Flat = []
     closures: Flat = []
-    cuts: Flat = []
     districts: list[District] = []
     goals: list[MapGoal] = []
     route: Flat = []
+
+
+class Cuts(Part, kw_only=True):
+    """The links between place nodes that are cut: both ends of each."""
+
+    links: Flat = []
 
 
 class Seen(Part, kw_only=True):
@@ -113,14 +126,23 @@ class Seen(Part, kw_only=True):
 
 
 class Camera(Part, kw_only=True):
-    """The newest view, and what was recognized in view `percepts_frame`; -1 where there is none."""
+    """The newest view, its picture, and what was recognized in view `percepts_frame`; -1 where
+    there is none.
+    """
 
     frame: int = -1
+    picture: str = ""
     percepts_frame: int = -1
     at_s: float = 0.0
     width_px: int = 0
     height_px: int = 0
     seen: list[Seen] = []
+
+
+class Depth(Part, kw_only=True):
+    """How far away what the newest view shows is, as a picture; empty where there is none."""
+
+    picture: str = ""
 
 
 class Contending(Part, kw_only=True):
@@ -229,17 +251,22 @@ class Topics(Part, kw_only=True):
     topics: list[TopicCount] = []
 
 
+class Streets(Part, kw_only=True):
+    """The names of the streets that a person may close, where the simulator says them."""
+
+    names: list[str] = []
+
+
 class TrueStreet(Part, kw_only=True):
     """A street of the true town, in the frame of the map."""
 
-    name: str
     line: Flat
     is_closed: bool
 
 
 class Truth(Part, kw_only=True):
-    """The town as it is, where the simulator says it, for observers alone: in the frame of the map,
-    where that frame is known; else without shapes.
+    """The town as it is, where the simulator says it, for observers alone: in the frame of the
+    map, nothing where that frame is not known.
     """
 
     streets: list[TrueStreet] = []

@@ -1,7 +1,8 @@
-"""The pictures of the page: views, depth, place nodes. Pure."""
+"""The pictures of the page: views, depth, place nodes, costs. Pure."""
 
 from __future__ import annotations
 
+import base64
 from typing import Any
 
 import cv2
@@ -9,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.cli.plots.palette import KERB, OBJECT, ROAD
+from cogmap.geometry.arrays import Singles
 from cogmap.graph.graph import Graph
 from cogmap.recording.views import camera_image, depth
 from cogmap.schemas.nodes import ROOT_MAP, PlaceColumn
@@ -19,7 +21,17 @@ NEAREST_M = 1.0
 FARTHEST_M = 100.0
 OBSTACLE = "#8d5fc4"
 OPACITY = 200
+DEAREST = 1000.0
+"""Of a place that is not blocked: way back that is blocked since."""
+
+JPEG = "image/jpeg"
+PNG = "image/png"
 Pixels = npt.NDArray[np.uint8]
+
+
+def data_url(kind: str, content: bytes) -> str:
+    """Return an address that is the picture itself: a page that has it asks for nothing more."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
 
 
 def view_jpeg(view: View) -> bytes:
@@ -59,6 +71,19 @@ def places_png(graph: Graph) -> bytes:
     return _encoded(".png", pixels, [])
 
 
+def costs_png(cost: Singles) -> bytes:
+    """Draw what it costs to drive over places, (width, height), north up, a pixel each: the dearer
+    the darker, by the logarithm up to DEAREST. What is blocked is grey.
+    """
+    is_blocked = ~np.isfinite(cost)
+    share = np.log(np.where(is_blocked, DEAREST, cost.clip(1.0, DEAREST))) / np.log(DEAREST)
+    levels = np.asarray(255 * (1 - np.flipud(share.T)), np.uint8)
+    pixels = cv2.cvtColor(cv2.applyColorMap(levels, cv2.COLORMAP_VIRIDIS), cv2.COLOR_BGR2BGRA)
+    pixels[np.flipud(is_blocked.T), :3] = _rgb(KERB)[::-1]
+    pixels[..., 3] = OPACITY
+    return _encoded(".png", pixels, [])
+
+
 def _activation(graph: Graph) -> npt.NDArray[np.float32]:
     """Return the activation of the root map's place nodes in this cycle, (width, height)."""
     extent = graph.places.extent(ROOT_MAP)
@@ -75,10 +100,14 @@ def _activation(graph: Graph) -> npt.NDArray[np.float32]:
 
 def _paint(pixels: Pixels, shares: npt.NDArray[np.float32], colour: str) -> None:
     """Lay a colour over BGRA pixels, as opaque as each cell's share."""
-    share = np.flipud(shares.T).clip(0, 1)[..., None]
-    colour_bgr = np.array(_rgb(colour)[::-1])
-    pixels[..., :3] = pixels[..., :3] * (1 - share) + colour_bgr * share
-    pixels[..., 3] = np.maximum(pixels[..., 3], OPACITY * share[..., 0])
+    upright = np.flipud(shares.T)
+    is_seen = upright > 0
+    share = upright[is_seen].clip(0, 1)[:, None]
+    colour_bgr = np.array(_rgb(colour)[::-1], np.float32)
+    below = pixels[is_seen]
+    below[:, :3] = below[:, :3] * (1 - share) + colour_bgr * share
+    below[:, 3] = np.maximum(below[:, 3], OPACITY * share[:, 0])
+    pixels[is_seen] = below
 
 
 def _rgb(colour: str) -> tuple[int, int, int]:

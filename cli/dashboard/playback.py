@@ -23,6 +23,7 @@ from cogmap.recording.storage.reader import LogReader, Record
 from cogmap.runtime import config
 from cogmap.schemas import topics
 from cogmap.schemas.graph import Delta, Snapshot
+from cogmap.services.codelets.public import PlanningConfig
 from cogmap.services.global_workspace.config import Config
 
 KEYFRAME_S = 1.0
@@ -59,7 +60,9 @@ class Playback:
         self._reader = LogReader(path)
         self.label = str(self._reader.path)
         self.lock = threading.Lock()
-        self._settings = config.recorded(recorded_config(self._reader), "global_workspace", Config)
+        sections = recorded_config(self._reader)
+        self._settings = config.recorded(sections, "global_workspace", Config)
+        self._planning = config.recorded(sections, "planning", PlanningConfig)
         self.scene = self._new_scene()
 
         self._begin_ns, self._end_ns = self._reader.span_ns
@@ -141,7 +144,7 @@ class Playback:
         def follow(delta: Delta, _incarnation: int | None) -> None:
             graph.apply(delta)
 
-        return Scene(graph, follow, self._settings, Path(self.label))
+        return Scene(graph, follow, self._settings, self._planning, Path(self.label))
 
     def _keyframe(self, scene: Scene, at_ns: int) -> Keyframe:
         content = lz4.frame.compress(encode(scene.graph.snapshot()))

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from cogmap.cli.dashboard import parts
-from cogmap.cli.dashboard.atlas import map_part, truth_part
+from cogmap.cli.dashboard.atlas import costs_part, cuts_part, map_part, places_part, truth_part
 from cogmap.cli.dashboard.health import system_part
 from cogmap.cli.dashboard.mind import mind_part
 from cogmap.cli.dashboard.parts import PartName, flat
+from cogmap.cli.dashboard.pictures import JPEG, data_url, depth_jpeg, view_jpeg
 from cogmap.cli.dashboard.received import Arrived, Received
 from cogmap.cli.explain import names
+from cogmap.errors import LogError
 from cogmap.graph.graph import Graph
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
@@ -33,6 +35,7 @@ from cogmap.schemas.sensing import (
     View,
 )
 from cogmap.schemas.topics import Scope, Topic
+from cogmap.services.codelets.public import PlanningConfig
 from cogmap.services.global_workspace.config import Config
 
 FOLLOWED = tuple(topic for topic in topics.ALL if topic is not topics.STEREO)
@@ -42,17 +45,17 @@ NAMES = 3
 """Names of a percept that are shown, the likeliest."""
 
 _CHANGED_BY: dict[type[Message], tuple[PartName, ...]] = {
-    Delta: (PartName.NOW, PartName.MAP),
+    Delta: (PartName.NOW, PartName.MAP, PartName.PLACES, PartName.COSTS, PartName.CUTS),
     MotorCommand: (PartName.NOW, PartName.SYSTEM),
     Energy: (PartName.NOW,),
-    View: (PartName.CAMERA,),
+    View: (PartName.CAMERA, PartName.DEPTH),
     Percepts: (PartName.CAMERA,),
     Competition: (PartName.MIND,),
     Broadcast: (PartName.MIND, PartName.NOW),
     Action: (PartName.MIND, PartName.NOW),
     Health: (PartName.SYSTEM,),
     Paused: (PartName.NOW,),
-    TrueTown: (PartName.TRUTH,),
+    TrueTown: (PartName.STREETS, PartName.TRUTH),
     TruePose: (PartName.TRUTH,),
 }
 
@@ -62,8 +65,8 @@ class Scene:
     delta and the incarnation that published it.
 
     Each part of what is shown has a version, which rises as something of it changes. `settings` are
-    those of the global workspace, by which a competition is explained; `place` is where the
-    messages come from.
+    those of the global workspace, by which a competition is explained, `planning` those by which
+    places cost; `place` is where the messages come from.
     """
 
     def __init__(
@@ -71,6 +74,7 @@ class Scene:
         graph: Graph,
         follow: Callable[[Delta, int | None], object],
         settings: Config,
+        planning: PlanningConfig,
         place: Path,
     ) -> None:
         self.graph = graph
@@ -78,6 +82,7 @@ class Scene:
         self.versions: Counter[PartName] = Counter(PartName)
         self._follow = follow
         self._settings = settings
+        self._planning = planning
         self._place = place
 
     def take(self, topic: Topic, arrived: Arrived) -> None:
@@ -101,11 +106,16 @@ class Scene:
         received = self.received
         made: dict[PartName, Callable[[], parts.Part]] = {
             PartName.NOW: self._now,
-            PartName.MAP: lambda: map_part(self.graph, self.versions[PartName.MAP]),
+            PartName.MAP: lambda: map_part(self.graph),
+            PartName.PLACES: lambda: places_part(self.graph),
+            PartName.COSTS: lambda: costs_part(self.graph, self._planning),
+            PartName.CUTS: lambda: cuts_part(self.graph),
             PartName.CAMERA: self._camera,
+            PartName.DEPTH: self._depth,
             PartName.MIND: lambda: mind_part(received, self.graph, self._settings, self._place),
             PartName.SYSTEM: lambda: system_part(received),
             PartName.TOPICS: self._topics,
+            PartName.STREETS: self._streets,
             PartName.TRUTH: self._truth,
         }
         return made[name]()
@@ -159,10 +169,21 @@ class Scene:
             camera.at_s = view.stamp_ns / 1e9
             camera.width_px = view.calibration.width_px
             camera.height_px = view.calibration.height_px
+            camera.picture = _picture(view, view_jpeg)
         if isinstance(percepts, Percepts):
             camera.percepts_frame = percepts.frame
             camera.seen = [_seen(each) for each in percepts.objects]
         return camera
+
+    def _depth(self) -> parts.Depth:
+        view = self.received.message(topics.VIEW)
+        return parts.Depth(picture=_picture(view, depth_jpeg) if isinstance(view, View) else "")
+
+    def _streets(self) -> parts.Streets:
+        town = self.received.message(topics.TRUE_TOWN)
+        if not isinstance(town, TrueTown):
+            return parts.Streets()
+        return parts.Streets(names=[street.name for street in town.streets])
 
     def _truth(self) -> parts.Truth:
         received = self.received
@@ -178,6 +199,14 @@ class Scene:
             if counts[topic]
         ]
         return parts.Topics(topics=rows)
+
+
+def _picture(view: View, draw: Callable[[View], bytes]) -> str:
+    """Return a picture of a view; none of a view whose arrays are no images."""
+    try:
+        return data_url(JPEG, draw(view))
+    except LogError:
+        return ""
 
 
 def _seen(percept: Percept) -> parts.Seen:

@@ -1,4 +1,4 @@
-"""Serves the page of the dashboard: its files, what is new of each part, pictures, wishes."""
+"""Serves the page of the dashboard: its files, what is new of each part, wishes."""
 
 from __future__ import annotations
 
@@ -12,25 +12,28 @@ from pathlib import Path
 import msgspec
 from aiohttp import WSMsgType, web
 
-from cogmap.cli.dashboard import pictures
-from cogmap.cli.dashboard.parts import PartName
+from cogmap.cli.dashboard.pace import Pace
+from cogmap.cli.dashboard.parts import ASKED_FOR, PartName
 from cogmap.cli.dashboard.scene import Scene
 from cogmap.cli.dashboard.source import Source, Wish
 from cogmap.errors import CogmapError
 from cogmap.schemas import topics
 from cogmap.schemas.render import to_text
-from cogmap.schemas.sensing import View
 
 PAGE = Path(__file__).parent / "page"
 PERIOD_S = 0.1
 """A browser is told what is new at most so often, and never before it has shown the last."""
 
 LOOK_S = 0.01
-LONGEST_WAIT_S = 0.25
+LONGEST_WAIT_S = 0.5
 """A browser that asks waits so long at most."""
 
 MADE_ANEW_S = {
     PartName.MAP: 0.5,
+    PartName.PLACES: 0.5,
+    PartName.COSTS: 1.0,
+    PartName.CUTS: 1.0,
+    PartName.DEPTH: 0.5,
     PartName.MIND: 0.5,
     PartName.SYSTEM: 0.5,
     PartName.TOPICS: 0.5,
@@ -38,10 +41,12 @@ MADE_ANEW_S = {
 }
 """How often a part is made anew at most: what changes slowly costs little."""
 
+ALWAYS = frozenset(PartName) - ASKED_FOR
+
 MAX_REQUEST_BYTES = 64 * 1024
 MAX_TEXT = 20_000
 HEADERS = {
-    "Content-Security-Policy": "default-src 'self'; img-src 'self' blob:; frame-ancestors 'none'",
+    "Content-Security-Policy": "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",
@@ -50,9 +55,12 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Asked(msgspec.Struct, kw_only=True):
-    """What a browser asks for: what is newer than what it has, and a message of `topic`."""
+    """What a browser asks for: what is newer than what it has, also of the parts `also`, which are
+    of ASKED_FOR, and a message of `topic`.
+    """
 
     have: dict[PartName, int] = {}
+    also: frozenset[PartName] = frozenset()
     topic: str = ""
 
 
@@ -75,7 +83,7 @@ class Dashboard:
         self._source = source
         self._names = {"localhost", host}
         self._made: dict[PartName, Made] = {}
-        self._pictures: dict[str, tuple[object, bytes]] = {}
+        self._pace = Pace()
         self._browsers = 0
 
     def application(self) -> web.Application:
@@ -86,9 +94,6 @@ class Dashboard:
             [
                 web.get("/", _index),
                 web.get("/news", self._news),
-                web.get("/view.jpg", self._view),
-                web.get("/depth.jpg", self._depth),
-                web.get("/places.png", self._places),
                 web.post("/wish", self._wish),
                 web.static("/page", PAGE),
             ]
@@ -148,6 +153,7 @@ class Dashboard:
             "label": self._source.label,
             "is_there": self._source.is_there,
             "playing": playing,
+            "rest_ms": 0.0 if playing is not None else self._pace.rest_ms(),
             "parts": {name: {"version": m.version, "content": m.content} for name, m in found},
             "message": self._message(asked.topic),
         }
@@ -161,12 +167,12 @@ class Dashboard:
         playing = self._source.playing
         if playing is None or playing.is_playing:
             return versions[PartName.CAMERA] != view
-        return any(versions[name] != asked.have.get(name) for name in PartName)
+        return any(versions[name] != asked.have.get(name) for name in ALWAYS | asked.also)
 
     def _parts(self, asked: Asked) -> list[tuple[PartName, Made]]:
         """Make what is newer than what a browser has, and not made too short a time ago."""
         found = []
-        for name in PartName:
+        for name in ALWAYS | asked.also:
             made = self._made.get(name)
             if made is None or self._is_due(name, made):
                 made = self._made[name] = self._make(name)
@@ -198,36 +204,6 @@ class Dashboard:
         if message is None:
             return None
         return {"topic": name, "text": to_text(message)[:MAX_TEXT]}
-
-    async def _view(self, request: web.Request) -> web.Response:
-        return await self._picture("view", "image/jpeg", pictures.view_jpeg)
-
-    async def _depth(self, request: web.Request) -> web.Response:
-        return await self._picture("depth", "image/jpeg", pictures.depth_jpeg)
-
-    async def _picture(self, name: str, kind: str, draw: Callable[[View], bytes]) -> web.Response:
-        """Return a picture of the newest view, which is drawn once for all browsers."""
-        view = self._source.scene.received.message(topics.VIEW)
-        if not isinstance(view, View):
-            raise web.HTTPNotFound(text="There is no view.")
-
-        drawn = self._pictures.get(name)
-        if drawn is None or drawn[0] is not view:
-            drawn = self._pictures[name] = (view, await asyncio.to_thread(draw, view))
-        return web.Response(body=drawn[1], content_type=kind)
-
-    async def _places(self, request: web.Request) -> web.Response:
-        """Return the picture of place nodes."""
-
-        def draw() -> bytes:
-            with self._source.lock:
-                return pictures.places_png(self._source.scene.graph)
-
-        version = request.query.get("v", "")
-        drawn = self._pictures.get("places")
-        if drawn is None or drawn[0] != version:
-            drawn = self._pictures["places"] = (version, await asyncio.to_thread(draw))
-        return web.Response(body=drawn[1], content_type="image/png")
 
     async def _wish(self, request: web.Request) -> web.Response:
         """Do what a person wishes, and say what was done, or why not."""

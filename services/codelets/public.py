@@ -12,6 +12,7 @@ from cogmap.services.codelets.localization.sampling import rejection_mask
 from cogmap.services.codelets.mapping import boundary
 from cogmap.services.codelets.planning import route_plan, tours
 from cogmap.services.codelets.planning.config import Config as PlanningConfig
+from cogmap.services.codelets.planning.place_cost import place_costs
 from cogmap.services.codelets.sub_maps import coarse_places, sub_map_places
 from cogmap.services.codelets.sub_maps.config import Config as SubMapsConfig
 from cogmap.services.codelets.sub_maps.sub_maps import SubMaps
@@ -27,6 +28,7 @@ __all__ = [
     "expectation",
     "landmarks",
     "localization",
+    "place_costs",
     "rejection_mask",
     "route_plan",
     "sub_map_places",

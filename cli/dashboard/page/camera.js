@@ -1,37 +1,40 @@
 // The camera image with what was recognized in it, and depth.
 import { byId, children, element, svg } from "/page/dom.js";
 
-let shown = -1;
-let isLoading = false;
 let newest = null;
+let isLoading = false;
 
 export function showCamera(camera) {
-  newest = camera;
   showSeen(camera);
   if (camera.frame < 0) return;
+  newest = camera;
   byId("camera-text").textContent =
     `frame ${camera.frame}, ${camera.at_s.toFixed(1)} s; recognized in frame ${camera.percepts_frame}`;
   load();
 }
 
-// One image at a time: a slow browser leaves frames out.
-async function load() {
-  if (isLoading || newest.frame === shown) return;
-  isLoading = true;
-  shown = newest.frame;
-  await Promise.all([put(byId("view"), "/view.jpg", shown), put(byId("depth"), "/depth.jpg", shown)]);
-  document.documentElement.dataset.frame = shown;
-  document.documentElement.dataset.shownMs = Date.now();
-  isLoading = false;
-  load();
+export function showDepth(depth) {
+  if (depth.picture) put(byId("depth"), depth.picture);
 }
 
-function put(image, path, frame) {
-  return new Promise((done) => {
-    image.onload = image.onerror = () => done();
-    image.src = `${path}?v=${frame}`;
-    image.hidden = false;
-  });
+// One image at a time: a slow browser leaves frames out.
+async function load() {
+  if (isLoading) return;
+  isLoading = true;
+  while (newest !== null) {
+    const { frame, picture } = newest;
+    newest = null;
+    await put(byId("view"), picture);
+    document.documentElement.dataset.frame = frame;
+    document.documentElement.dataset.shownMs = Date.now();
+  }
+  isLoading = false;
+}
+
+async function put(image, picture) {
+  image.src = picture;
+  image.hidden = false;
+  await image.decode().catch(() => {}); // a picture that cannot be shown is left out
 }
 
 function showSeen(camera) {

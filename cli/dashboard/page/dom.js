@@ -36,10 +36,21 @@ export function bar(name, value, { share, rest = 0, note = "", chosen = false })
 export const colour = (name) =>
   getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
-export function sharp(canvas) {
+// The sizes of canvases, in CSS pixels: to ask an element for its size lays out the page anew.
+const sizes = new WeakMap();
+
+// Calls `then` whenever a canvas has another size.
+export function resized(canvas, then) {
+  new ResizeObserver(([entry]) => {
+    sizes.set(canvas, entry.contentRect);
+    then();
+  }).observe(canvas);
+}
+
+// Clears a canvas whose size is watched by `resized`, and returns its context.
+export function cleared(canvas) {
   const ratio = window.devicePixelRatio || 1;
-  const width = canvas.clientWidth;
-  const height = canvas.clientHeight;
+  const { width, height } = sizes.get(canvas) || { width: 0, height: 0 };
   if (canvas.width !== Math.round(width * ratio) || canvas.height !== Math.round(height * ratio)) {
     canvas.width = Math.round(width * ratio);
     canvas.height = Math.round(height * ratio);

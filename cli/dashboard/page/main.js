@@ -1,19 +1,24 @@
 // Asks the server for what is new, and hands each part to its panels.
 import { MapView } from "/page/map.js";
-import { showCamera } from "/page/camera.js";
+import { showCamera, showDepth } from "/page/camera.js";
 import { showMind } from "/page/mind.js";
 import { showSystem, showTopics, showMessage } from "/page/system.js";
 import { byId, children, element } from "/page/dom.js";
 
 const RETRY_MS = 1000;
+const ASKED_FOR = ["costs", "cuts", "truth"]; // layers that are sent only while they are shown
 // A page rests longer than it draws, so that a slow machine is left to what it shows.
 const RESTS = 9;
 const LONGEST_REST_MS = 400;
-const map = new MapView(byId("map"), byId("layers"), (x, y) => wish({ place: [x, y] }));
+const map = new MapView(byId("map"), byId("above"), byId("layers"), {
+  onGoal: (x, y) => wish({ place: [x, y] }),
+  onLayer: () => ask(),
+});
 const have = {};
 let playing = null;
 let isSliding = false;
 let isLive = false;
+let restMs = 0; // what the server asks for
 let now = null;
 let ask = () => {};
 
@@ -25,7 +30,8 @@ function connect() {
     if (rest === null) return;
     clearTimeout(rest);
     rest = null;
-    socket.send(JSON.stringify({ have, topic: byId("topic").value }));
+    const also = ASKED_FOR.filter((name) => map.shown[name]);
+    socket.send(JSON.stringify({ have, also, topic: byId("topic").value }));
   };
   const askAfter = (ms) => { rest = setTimeout(() => ask(), ms); };
   socket.onopen = () => askAfter(0);
@@ -34,7 +40,8 @@ function connect() {
     show(JSON.parse(new TextDecoder().decode(event.data)));
     const showing = performance.now() - began;
     if (document.hidden) askAfter(RETRY_MS);
-    else drawn((drawing) => askAfter(Math.min(RESTS * (showing + drawing), LONGEST_REST_MS)));
+    else drawn((drawing) =>
+      askAfter(Math.max(restMs, Math.min(RESTS * (showing + drawing), LONGEST_REST_MS))));
   };
   socket.onclose = () => {
     clearTimeout(rest);
@@ -54,6 +61,7 @@ function drawn(then) {
 
 function show(news) {
   byId("label").textContent = news.label;
+  restMs = news.rest_ms;
   isLive = news.playing === null;
   byId("player").hidden = isLive;
   byId("person").hidden = !isLive;
@@ -71,11 +79,16 @@ function show(news) {
 const panels = {
   now: showNow,
   map: (content) => { map.setMap(content); showNames(content.objects); },
+  places: (content) => map.setPicture("places", content),
+  costs: (content) => map.setPicture("costs", content),
   camera: showCamera,
+  depth: showDepth,
   mind: showMind,
   system: showSystem,
   topics: showTopics,
-  truth: (content) => { map.setTruth(content); showStreets(content.streets); },
+  cuts: (content) => map.setCuts(content.links),
+  streets: (content) => showStreets(content.names),
+  truth: (content) => map.setTruth(content),
 };
 
 function showNow(content) {
@@ -132,10 +145,12 @@ function showNames(objects) {
   children(byId("names"), names.map((value) => element("option", { value })));
 }
 
-function showStreets(streets) {
+// A list that is the same stays, with what is chosen of it.
+function showStreets(names) {
   const select = byId("street");
-  if (select.options.length === streets.length) return;
-  children(select, streets.map((each) => element("option", {}, each.name)));
+  const shown = [...select.options].map((each) => each.value);
+  if (shown.join() === names.join()) return;
+  children(select, names.map((name) => element("option", {}, name)));
 }
 
 async function wish(wanted) {

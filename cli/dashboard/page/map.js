@@ -1,8 +1,9 @@
 // The learned map on a canvas: layers, panning, zooming, and goals by a click.
-import { byId, colour, element, sharp } from "/page/dom.js";
+import { byId, cleared, colour, element, resized } from "/page/dom.js";
 
 const LAYERS = [
   ["places", "streets, what stands there, active places", "#4f9d8f", true],
+  ["costs", "what driving there costs: dark is dear, grey blocked", "#31688e", false],
   ["truth", "the true town and path", "var(--house)", false],
   ["districts", "districts", "var(--district)", true],
   ["cuts", "links cut", "var(--cut)", false],
@@ -16,14 +17,18 @@ const MARGIN_M = 6;
 const CLICK_PX = 4;
 
 export class MapView {
-  constructor(canvas, layers, onGoal) {
+  // The agent, which moves more often than the rest changes, is on a canvas of its own, `above`.
+  constructor(canvas, above, layers, { onGoal, onLayer }) {
     this.canvas = canvas;
+    this.above = above;
     this.onGoal = onGoal;
+    this.onLayer = onLayer;
     this.takesGoals = false;
     this.map = null;
     this.now = null;
     this.truth = null;
-    this.picture = null;
+    this.cuts = [];
+    this.pictures = {};
     this.shown = {};
     this.view = null; // the middle in metres, and pixels a metre; null fits all
     for (const [name, label, swatch, isOn] of LAYERS) this.addLayer(layers, name, label, swatch, isOn);
@@ -31,14 +36,19 @@ export class MapView {
     fit.onclick = () => { this.view = null; this.draw(); };
     layers.append(fit);
     this.listen();
-    addEventListener("resize", () => this.draw());
+    resized(canvas, () => this.draw());
+    resized(above, () => this.draw());
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
 
   addLayer(layers, name, label, swatch, isOn) {
     const box = element("input", { type: "checkbox" });
     box.checked = this.shown[name] = isOn;
-    box.onchange = () => { this.shown[name] = box.checked; this.draw(); };
+    box.onchange = () => {
+      this.shown[name] = box.checked;
+      this.draw();
+      this.onLayer();
+    };
     const sample = element("span", { class: "swatch", "aria-hidden": "true" });
     sample.style.background = swatch;
     layers.append(element("label", {}, [box, sample, label]));
@@ -46,7 +56,6 @@ export class MapView {
 
   setMap(map) {
     this.map = map;
-    if (map.layer && (!this.picture || this.picture.version !== map.layer.version)) this.loadPicture(map.layer);
     const count = map.objects.length;
     byId("map-text").textContent =
       `${count} objects, ${map.closures.length / 4} loop closures, ${map.goals.length} goals. ` +
@@ -55,18 +64,24 @@ export class MapView {
     this.draw();
   }
 
-  // The picture before stays until the next one is there.
-  loadPicture(layer) {
-    if (this.isLoading) return;
-    this.isLoading = true;
+  // The picture before stays until the next one can be drawn.
+  async setPicture(name, layer) {
+    if (!layer.picture) return;
     const image = new Image();
-    image.onload = () => { this.isLoading = false; this.picture = { ...layer, image }; this.draw(); };
-    image.onerror = () => { this.isLoading = false; };
-    image.src = `/places.png?v=${layer.version}`;
+    image.src = layer.picture;
+    await image.decode().catch(() => {});
+    this.pictures[name] = { ...layer, image };
+    this.draw();
   }
 
-  setNow(now) { this.now = now; this.draw(); }
+  setNow(now) {
+    this.now = now;
+    if (this.scale) requestAnimationFrame(() => this.drawAbove());
+    else this.draw();
+  }
+
   setTruth(truth) { this.truth = truth; this.draw(); }
+  setCuts(cuts) { this.cuts = cuts; this.draw(); }
 
   draw() {
     if (this.isDue) return;
@@ -75,15 +90,22 @@ export class MapView {
   }
 
   drawNow() {
-    const { context, width, height } = sharp(this.canvas);
+    const { context, width, height } = cleared(this.canvas);
     if (!this.map && !this.now) return;
     this.scale = this.view || this.fitted(width, height);
     this.size = [width, height];
-    if (this.picture && this.shown.places) this.drawPicture(context);
+    for (const name of ["places", "costs"]) {
+      if (this.pictures[name] && this.shown[name]) this.drawPicture(context, this.pictures[name]);
+    }
     if (this.truth && this.shown.truth) this.drawTruth(context);
     if (this.map) this.drawMap(context);
-    if (this.now && this.now.pose) this.drawAgent(context);
     this.drawScale(context, height);
+    this.drawAbove();
+  }
+
+  drawAbove() {
+    const { context } = cleared(this.above);
+    if (this.now && this.now.pose) this.drawAgent(context);
   }
 
   fitted(width, height) {
@@ -133,8 +155,8 @@ export class MapView {
     context.stroke();
   }
 
-  drawPicture(context) {
-    const { west_m, south_m, width_m, height_m, image } = this.picture;
+  drawPicture(context, picture) {
+    const { west_m, south_m, width_m, height_m, image } = picture;
     const [left, top] = this.toScreen(west_m, south_m + height_m);
     context.imageSmoothingEnabled = false;
     context.globalAlpha = 0.75;
@@ -177,7 +199,7 @@ export class MapView {
     if (shown.cuts) {
       context.strokeStyle = colour("cut");
       context.lineWidth = 1;
-      this.pairs(context, map.cuts);
+      this.pairs(context, this.cuts);
     }
     if (shown.path) {
       context.strokeStyle = colour("estimate");

@@ -1,5 +1,5 @@
 // What competes and becomes conscious, schemes, needs, and why.
-import { bar, byId, children, colour, element, sharp } from "/page/dom.js";
+import { bar, byId, children, cleared, colour, element, resized } from "/page/dom.js";
 
 const ROW = 18;
 const BAR = /^[█▏▎▍▌▋▊▉ ]+$/; // as a terminal draws it; the number beside it says the same
@@ -19,7 +19,7 @@ export function showMind(mind) {
 }
 
 function drawTimeline() {
-  const { context, width, height } = sharp(byId("timeline"));
+  const { context, width, height } = cleared(byId("timeline"));
   const codelets = [...new Set(competitions.flatMap((each) => each.contenders.map((c) => c.codelet)))].sort();
   if (!codelets.length) return;
   const labels = Math.min(LABELS, width * 0.35);
@@ -72,4 +72,4 @@ function showWhy(mind) {
   if (!panel.matches(":hover, :focus")) children(panel, made);
 }
 
-addEventListener("resize", drawTimeline);
+resized(byId("timeline"), drawTimeline);

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+import base64
 from pathlib import Path
 
 import cv2
+import msgspec
 import numpy as np
 import pytest
 
-from cogmap.cli.dashboard import parts, pictures
+from cogmap.cli.dashboard import parts
 from cogmap.cli.dashboard.parts import PartName
+from cogmap.cli.dashboard.pictures import Pixels
 from cogmap.cli.dashboard.received import Arrived
 from cogmap.cli.dashboard.scene import FOLLOWED, Scene
 from cogmap.graph.graph import Graph
 from cogmap.recording import open_log
 from cogmap.recording.storage.reader import LogReader
 from cogmap.schemas import topics
+from cogmap.schemas.array import Array
+from cogmap.schemas.graph import Delta
 from cogmap.schemas.nodes import Object
 from cogmap.schemas.process import Health
 from cogmap.schemas.sensing import Percepts, TruePose, View
+from cogmap.services.codelets.public import PlanningConfig
 from cogmap.services.global_workspace.config import Config
 from tests.support.reference import REFERENCE
 
@@ -27,7 +33,20 @@ SECOND_NS = 10**9
 
 def new_scene() -> Scene:
     graph = Graph()
-    return Scene(graph, lambda delta, _incarnation: graph.apply(delta), Config(), Path("drive"))
+
+    def follow(delta: Delta, _incarnation: int | None) -> None:
+        graph.apply(delta)
+
+    return Scene(graph, follow, Config(), PlanningConfig(), Path("drive"))
+
+
+def pixels_of(picture: str, kind: str) -> Pixels:
+    """What is in a picture that is its own address."""
+    start, content = picture.split(",")
+    assert start == f"data:{kind};base64"
+    pixels = cv2.imdecode(np.frombuffer(base64.b64decode(content), np.uint8), cv2.IMREAD_UNCHANGED)
+    assert pixels is not None
+    return np.asarray(pixels, np.uint8)
 
 
 @pytest.fixture(scope="module")
@@ -74,22 +93,39 @@ def test_the_map_has_every_object_the_path_and_the_route(scene: Scene) -> None:
     assert drawn.path
     assert drawn.route
     assert [goal.name for goal in drawn.goals]
-    assert drawn.layer is not None
 
 
 def test_the_picture_of_places_is_as_large_as_the_map_says(scene: Scene) -> None:
-    drawn = scene.part(PartName.MAP)
-    assert isinstance(drawn, parts.MapPart)
-    assert drawn.layer is not None
-    encoded = np.frombuffer(pictures.places_png(scene.graph), np.uint8)
-    pixels = cv2.imdecode(encoded, cv2.IMREAD_UNCHANGED)
+    for name in (PartName.PLACES, PartName.COSTS):
+        layer = scene.part(name)
+        assert isinstance(layer, parts.Layer)
+        pixels = pixels_of(layer.picture, "image/png")
 
-    assert pixels is not None
-    height, width, channels = pixels.shape
-    cell_m = scene.graph.cell_m()
-    assert (width * cell_m, height * cell_m) == (drawn.layer.width_m, drawn.layer.height_m)
-    assert channels == 4
-    assert pixels[..., 3].any()
+        height, width, channels = pixels.shape
+        cell_m = scene.graph.cell_m()
+        assert (width * cell_m, height * cell_m) == (layer.width_m, layer.height_m)
+        assert channels == 4
+        assert pixels[..., 3].any()
+
+
+def test_what_driving_costs_covers_the_places_and_blocks_some(scene: Scene) -> None:
+    places = scene.part(PartName.PLACES)
+    costs = scene.part(PartName.COSTS)
+    assert isinstance(places, parts.Layer)
+    assert isinstance(costs, parts.Layer)
+
+    assert costs.west_m <= places.west_m
+    assert costs.west_m + costs.width_m >= places.west_m + places.width_m
+    colours = pixels_of(costs.picture, "image/png").reshape(-1, 4)
+    assert len(np.unique(colours, axis=0)) > 2
+
+
+def test_links_that_are_cut_have_two_ends_each(scene: Scene) -> None:
+    cuts = scene.part(PartName.CUTS)
+
+    assert isinstance(cuts, parts.Cuts)
+    assert cuts.links
+    assert len(cuts.links) % 4 == 0
 
 
 def test_the_camera_shows_the_newest_view_and_what_was_recognized(scene: Scene) -> None:
@@ -102,10 +138,27 @@ def test_the_camera_shows_the_newest_view_and_what_was_recognized(scene: Scene) 
     assert isinstance(percepts, Percepts)
     assert camera.frame == view.frame
     assert len(camera.seen) == len(percepts.objects)
-    for draw in (pictures.view_jpeg, pictures.depth_jpeg):
-        pixels = cv2.imdecode(np.frombuffer(draw(view), np.uint8), cv2.IMREAD_COLOR)
-        assert pixels is not None
-        assert pixels.shape[:2] == (view.calibration.height_px, view.calibration.width_px)
+    depth = scene.part(PartName.DEPTH)
+    assert isinstance(depth, parts.Depth)
+    for picture in (camera.picture, depth.picture):
+        height, width, _ = pixels_of(picture, "image/jpeg").shape
+        assert (height, width) == (view.calibration.height_px, view.calibration.width_px)
+
+
+def test_a_view_without_an_image_has_no_picture() -> None:
+    no_image = np.zeros((4, 4, 2), np.uint8)
+    reader = LogReader(REFERENCE)
+    record = next(reader.records([topics.VIEW]))
+    view = reader.message(record)
+    assert isinstance(view, View)
+    broken = msgspec.structs.replace(view, image=Array.of(no_image))
+    shown = new_scene()
+    shown.take(topics.VIEW, Arrived(broken, record.envelope, record.log_time_ns))
+    camera = shown.part(PartName.CAMERA)
+
+    assert isinstance(camera, parts.Camera)
+    assert camera.frame == view.frame
+    assert camera.picture == ""
 
 
 def test_the_mind_shows_competitions_the_schemes_and_every_stage(scene: Scene) -> None:
@@ -153,13 +206,11 @@ def test_without_the_first_true_pose_the_town_has_names_alone() -> None:
         if isinstance(entry.message, TruePose) and entry.message.seq == 0:
             continue
         shown.take(topics.of(entry.message), Arrived(entry.message, None, 0))
-    truth = shown.part(PartName.TRUTH)
+    streets = shown.part(PartName.STREETS)
 
-    assert isinstance(truth, parts.Truth)
-    assert [street.name for street in truth.streets]
-    assert {tuple(street.line) for street in truth.streets} == {()}
-    assert truth.buildings == []
-    assert truth.path == []
+    assert isinstance(streets, parts.Streets)
+    assert streets.names
+    assert shown.part(PartName.TRUTH) == parts.Truth()
 
 
 def test_every_part_is_there_before_the_first_message() -> None:

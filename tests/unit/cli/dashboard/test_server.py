@@ -10,7 +10,7 @@ import msgspec
 import pytest
 from aiohttp.test_utils import TestClient, TestServer
 
-from cogmap.cli.dashboard.parts import PartName
+from cogmap.cli.dashboard.parts import ASKED_FOR, PartName
 from cogmap.cli.dashboard.playback import Playback
 from cogmap.cli.dashboard.server import Dashboard
 from cogmap.cli.dashboard.source import Wish
@@ -52,10 +52,16 @@ async def news(client: Client, **asked: Any) -> dict[str, Any]:
 def test_a_browser_gets_every_part_first(source: Playback) -> None:
     found = visited(source, news)
 
-    assert set(found["parts"]) == set(PartName)
+    assert set(found["parts"]) == set(PartName) - ASKED_FOR
     assert found["label"] == str(REFERENCE)
     assert found["playing"]["duration_s"] > 0.0
     assert found["message"] is None
+
+
+def test_a_layer_that_it_shows_comes_too(source: Playback) -> None:
+    found = visited(source, lambda client: news(client, also=["costs"]))
+
+    assert set(found["parts"]) == set(PartName) - ASKED_FOR | {PartName.COSTS}
 
 
 def test_then_only_what_is_newer(source: Playback) -> None:
@@ -83,12 +89,9 @@ def test_the_newest_message_of_a_topic_comes_as_text(source: Playback) -> None:
         ("/", "html"),
         ("/page/main.js", "javascript"),
         ("/page/style.css", "css"),
-        ("/view.jpg", "jpeg"),
-        ("/depth.jpg", "jpeg"),
-        ("/places.png", "png"),
     ],
 )
-def test_the_page_and_its_pictures_are_served(source: Playback, path: str, kind: str) -> None:
+def test_the_page_is_served(source: Playback, path: str, kind: str) -> None:
     async def visit(client: Client) -> tuple[int, str, str]:
         response = await client.get(path)
         policy = response.headers["Content-Security-Policy"]
