@@ -20,6 +20,8 @@ from cogmap.schemas.sensing import MotorCommand
 
 MOTOR = "motor"
 MAX_SPEED_M_S = MAX_WHEEL_RAD_S * WHEEL_RADIUS_M
+SPEED_M_S = 2.0
+TURN_RATE_RAD_S = 0.6
 LOOK_NS = 50_000_000
 
 HELD_NS = 600_000_000
@@ -58,7 +60,9 @@ _HELP = """\
 class Steering:
     """Follows the keys: `speed_m_s` and `turn_rate_rad_s` are those of a key that is held. Pure."""
 
-    def __init__(self, speed_m_s: float, turn_rate_rad_s: float) -> None:
+    def __init__(
+        self, speed_m_s: float = SPEED_M_S, turn_rate_rad_s: float = TURN_RATE_RAD_S
+    ) -> None:
         self._speed_m_s = speed_m_s
         self._turn_rate_rad_s = turn_rate_rad_s
         self._direction = (0, 0)
@@ -102,7 +106,7 @@ class Steering:
     "--speed",
     "speed_m_s",
     type=FiniteRange(min=0, min_open=True, max=MAX_SPEED_M_S),
-    default=2.0,
+    default=SPEED_M_S,
     show_default=True,
     help="Speed ahead and back, in m/s.",
 )
@@ -110,7 +114,7 @@ class Steering:
     "--turn",
     "turn_rate_rad_s",
     type=FiniteRange(min=0, min_open=True, max=5.0),
-    default=0.6,
+    default=TURN_RATE_RAD_S,
     show_default=True,
     help="Turn rate, in rad/s.",
 )
@@ -124,18 +128,22 @@ def teleop(speed_m_s: float, turn_rate_rad_s: float, connect: str, agent: str) -
     if not sys.stdin.isatty():
         raise UsageError("teleop reads keys from a terminal: start it in one")
 
+    check_nobody_drives(connect, agent)
+    steering = Steering(speed_m_s, turn_rate_rad_s)
+    click.echo(_HELP)
+    with Client(steering.module(), connect, agent):
+        while (key := _key()) not in ENDS:
+            steering.press(key)
+
+
+def check_nobody_drives(connect: str, agent: str) -> None:
+    """Raise UsageError if a process commands the robot's wheels already."""
     publishing = inspect_system(connect, agent).doing(Role.PUBLISHES, topics.MOTOR_COMMAND)
     if publishing:
         names = ", ".join(process.name for process in publishing)
         raise UsageError(
             f"{names} drives the robot already: start with `cogmap run --without motor`"
         )
-
-    steering = Steering(speed_m_s, turn_rate_rad_s)
-    click.echo(_HELP)
-    with Client(steering.module(), connect, agent):
-        while (key := _key()) not in ENDS:
-            steering.press(key)
 
 
 def _key() -> str:

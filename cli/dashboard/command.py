@@ -17,7 +17,7 @@ from cogmap.cli.dashboard.source import Source
 from cogmap.cli.options import DASHBOARD_PORT
 from cogmap.errors import PortInUseError
 from cogmap.runtime.process import Stop, give_way
-from cogmap.runtime.program import agent_option, connect_option, tied_option
+from cogmap.runtime.program import agent_option, config_option, connect_option, tied_option
 
 LOOK_S = 0.1
 
@@ -42,6 +42,7 @@ LOOK_S = 0.1
 @tied_option
 @connect_option
 @agent_option
+@config_option
 def dashboard(
     log: Path | None,
     host: str,
@@ -50,12 +51,14 @@ def dashboard(
     tied: bool,
     connect: str,
     agent: str,
+    config_path: Path | None,
 ) -> None:
     """Show the mind in a browser: of a running system, or of LOG, a log or a run's folder.
 
     What the agent sees, its map, what competes and becomes conscious, what it does and why, how
-    fast it is, and every message. Of a running system a click on the map is a goal; a log has a
-    slider of time. It asks no other host for anything. Ctrl-C ends it.
+    fast it is, and every message. Of a running system a click on the map is a goal, keys drive the
+    robot where nothing else does, and workers are added and killed; a log has a slider of time. It
+    asks no other host for anything. Ctrl-C ends it.
 
     \b
     cogmap dashboard                  the system that runs on this machine
@@ -64,7 +67,7 @@ def dashboard(
     """
     if log is None:
         give_way()
-    source: Source = Live(connect, agent) if log is None else Playback(log)
+    source: Source = Live(connect, agent, config_path) if log is None else Playback(log)
     try:
         asyncio.run(serve(source, host, port, opens, Stop(tied)))
     finally:

@@ -7,7 +7,7 @@ from statistics import median
 
 import numpy as np
 
-from cogmap.cli.dashboard import parts
+from cogmap.cli.dashboard import parts, workers
 from cogmap.cli.dashboard.received import Arrived, Received
 from cogmap.schemas.process import Health
 
@@ -59,6 +59,7 @@ def _process(arrived: Arrived, is_silent: bool) -> parts.ProcessHealth:
     assert isinstance(health, Health)
     return parts.ProcessHealth(
         instance=health.instance,
+        is_worker=health.module == workers.MODULE,
         busy=health.busy,
         compute_p50_ms=health.compute_p50_ms,
         memory_mb=health.memory_mb,

@@ -13,14 +13,17 @@ import msgspec
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Arrival, Member
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.dashboard.driving import Driving
 from cogmap.cli.dashboard.received import Arrived
 from cogmap.cli.dashboard.scene import FOLLOWED, Scene
 from cogmap.cli.dashboard.source import Playing, Wish
+from cogmap.cli.dashboard.workers import Workers
 from cogmap.errors import NoAnswerError, NoRouterError, UsageError
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import called
 from cogmap.graph.replica import Fetched, Replica, snapshot_over
 from cogmap.hints import did_you_mean
+from cogmap.runtime import config
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.schemas import topics
@@ -41,11 +44,11 @@ PUBLISHED = (topics.OFFER, topics.STREET_CLOSURE, topics.PAUSE)
 
 
 class Live:
-    """The system at `endpoint`. It is on the bus only while a browser watches, and costs nothing
-    else.
+    """The system at `endpoint`, whose settings are in the file `config_path` if that is given. It
+    is on the bus only while a browser watches, and costs nothing else. Raises ConfigError.
     """
 
-    def __init__(self, endpoint: str, agent: str) -> None:
+    def __init__(self, endpoint: str, agent: str, config_path: Path | None = None) -> None:
         self.label = f"{agent} at {endpoint}"
         self.lock = threading.Lock()
         self._endpoint = endpoint
@@ -53,7 +56,10 @@ class Live:
         self._is_wanted = threading.Event()
         self._has_ended = threading.Event()
         self._connection: Connection | None = None
-        self.scene = _scene(Replica(_nowhere), self.label)
+        self._driving = Driving(endpoint, agent)
+        self._workers = Workers(endpoint, agent, config_path)
+        self._sections = config.load(config_path, ())
+        self.scene = self._scene(Replica(_nowhere))
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
 
@@ -73,12 +79,20 @@ class Live:
             self._is_wanted.set()
         else:
             self._is_wanted.clear()
+            self._driving.leave()
 
     def act(self, wish: Wish) -> str:
-        """Publish what a person wishes. Raises UsageError if it is not for a running system."""
+        """Do what a person wishes. Raises UsageError if it is not for a running system."""
         connection = self._connection
         if connection is None:
             raise UsageError(f"nothing runs at {self._endpoint}: start it with `cogmap run`")
+        if wish.key is not None:
+            return self._driving.press(wish.key)
+        if wish.adds_worker:
+            return self._workers.add()
+        if wish.kill is not None:
+            return self._workers.kill(wish.kill)
+
         with self.lock:
             message, done = message_for(wish, self.scene.graph)
         connection.publish(message)
@@ -89,6 +103,13 @@ class Live:
         self._has_ended.set()
         self._is_wanted.set()
         self._thread.join()
+        self._driving.leave()
+        self._workers.close()
+
+    def _scene(self, replica: Replica) -> Scene:
+        settings = config.recorded(self._sections, "global_workspace", Config)
+        planning = config.recorded(self._sections, "planning", PlanningConfig)
+        return Scene(replica.graph, replica.follow, settings, planning, Path(self.label))
 
     def _work(self) -> None:
         while not self._has_ended.is_set():
@@ -105,7 +126,7 @@ class Live:
     def _follow(self, bus: ZenohBus) -> None:
         """Follow the system until nobody watches it, or its router is gone."""
         replica = Replica(snapshot_over(bus))
-        scene = _scene(replica, self.label)
+        scene = self._scene(replica)
         with self.lock:
             scene.follow_on(self.scene)
             self.scene = scene
@@ -165,10 +186,6 @@ class Connection:
 def _nowhere(_request: SnapshotRequest) -> Fetched:
     """Find no workspace, as where no bus is."""
     raise NoAnswerError("not on a bus")
-
-
-def _scene(replica: Replica, label: str) -> Scene:
-    return Scene(replica.graph, replica.follow, Config(), PlanningConfig(), Path(label))
 
 
 def message_for(wish: Wish, graph: Graph) -> tuple[Message, str]:

@@ -218,6 +218,7 @@ class ProcessHealth(Part, kw_only=True):
     """How a process fares. `is_silent` if it has said nothing for long."""
 
     instance: str
+    is_worker: bool
     busy: float
     compute_p50_ms: float
     memory_mb: float

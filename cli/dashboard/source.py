@@ -59,8 +59,10 @@ class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """What a person wants done; one of its fields is given.
 
     `goal` is an object's name or label, `place` x and y on the map, to go to; `clear` forgets all
-    goals. `street` is to be `closed` or opened. `play` is whether time is to pass, `step` asks for
-    the next cycle alone. Of a log: `seek_s` is a time to show, `speed` is how fast it plays.
+    goals. `street` is to be `closed` or opened. `key` drives the robot as those of `cogmap teleop`
+    do. `adds_worker` is for one more worker, `kill` the instance of one to kill. `play` is whether
+    time is to pass, `step` asks for the next cycle alone. Of a log: `seek_s` is a time to show,
+    `speed` is how fast it plays.
     """
 
     goal: Name | None = None
@@ -68,6 +70,9 @@ class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     clear: bool = False
     street: str = ""
     closed: bool = True
+    key: str | None = None
+    adds_worker: bool = False
+    kill: Name | None = None
     seek_s: float | None = None
     play: bool | None = None
     step: bool = False

@@ -187,7 +187,7 @@ class Drive:
         self._serves_dashboard = True
         port = free_port(DASHBOARD_PORT)
         opens = self.choices.opens_dashboard
-        self.supervisor.start(dashboard(self.endpoint, self.agent, port, opens))
+        self.supervisor.start(dashboard(self.folder, self.endpoint, self.agent, port, opens))
         display.show(f"dashboard: http://127.0.0.1:{port}")
 
     def _note(self, milestone: str) -> None:

@@ -14,6 +14,7 @@ from urllib.request import urlopen
 import pytest
 from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
 
 from benchmarks.dashboard.browser import foreign_requests
 from cogmap.bus.codec import decode
@@ -23,6 +24,7 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.schemas import topics
 from cogmap.schemas.codelets import Offer
 from cogmap.schemas.nodes import Goal
+from cogmap.schemas.sensing import MotorCommand
 from tests.support.reference import REFERENCE
 from tests.support.system.browser import await_script, browser, errors, faults
 from tests.support.system.processes import wait_until
@@ -88,7 +90,9 @@ def serve(tmp_path: Path) -> Iterator[Callable[..., Served]]:
         each.close()
 
 
+ANSWER = "document.getElementById('answer').textContent"
 STATUS = "document.getElementById('status').textContent"
+IS_THERE = f"return !['waiting', 'no system runs here'].includes({STATUS})"
 DRIVES = "/drives|slowed|stands/"
 SLIDE_TO_END = """
 const slider = document.getElementById('time');
@@ -129,13 +133,80 @@ def test_every_panel_shows_the_running_system_and_a_click_is_a_goal(
         given = f"{offered[0].x_m:g},{offered[0].y_m:g} is a goal now"
         await_script(
             page,
-            f"return document.getElementById('answer').textContent === '{given}'",
+            f"return {ANSWER} === '{given}'",
             "the page says what it has done",
         )
         assert faults(page) == []
         assert errors(page) == []
         assert foreign_requests(page, urlsplit(served.address).netloc) == []
     bus.close()
+    run.close()
+
+
+def test_keys_drive_a_robot_that_nothing_else_drives(
+    start: Callable[..., Run], serve: Callable[..., Served]
+) -> None:
+    run = start(*PERCEPTS, "--without", "motor")
+    run.wait_for("motor")
+    commands: list[MotorCommand] = []
+
+    def receive(arrival: Arrival) -> None:
+        message = decode(topics.MOTOR_COMMAND, arrival.payload)
+        assert isinstance(message, MotorCommand)
+        commands.append(message)
+
+    bus = ZenohBus(run.endpoint, "agent")
+    bus.subscribe(topics.MOTOR_COMMAND, receive, lambda _topic, _number: None)
+    served = serve("--connect", run.endpoint)
+    with browser() as page:
+        page.get(served.address)
+        await_script(page, IS_THERE, "the system is there")
+        page.find_element(By.ID, "drive").click()
+        await_script(page, f"return {ANSWER} === 'you drive'", "the robot obeys")
+
+        def is_ahead() -> bool:
+            page.find_element(By.TAG_NAME, "body").send_keys(Keys.ARROW_UP)
+            return any(each.left_wheel_rad_s > 0.0 for each in commands)
+
+        wait_until(is_ahead, "it drives ahead")
+        page.find_element(By.ID, "drive").click()
+        await_script(page, f"return {ANSWER} === 'the robot is left alone'", "it is left")
+    bus.close()
+    run.close()
+
+
+def test_what_drives_already_is_not_driven_by_keys(
+    start: Callable[..., Run], serve: Callable[..., Served]
+) -> None:
+    run = start(*PERCEPTS)
+    run.wait_for(DRIVING)
+    served = serve("--connect", run.endpoint)
+    with browser() as page:
+        page.get(served.address)
+        await_script(page, IS_THERE, "the system is there")
+        page.find_element(By.ID, "drive").click()
+        await_script(page, f"return {ANSWER}.includes('--without motor')", "the remedy is said")
+    run.close()
+
+
+def test_a_worker_is_added_and_another_one_is_killed(
+    start: Callable[..., Run], serve: Callable[..., Served]
+) -> None:
+    run = start(*PERCEPTS)
+    run.wait_for(DRIVING)
+    served = serve("--connect", run.endpoint, "--config", str(run.folder / "config.toml"))
+    before = run.pid_of("codelets-1")
+    with browser() as page:
+        page.get(served.address)
+        await_script(page, IS_THERE, "the system is there")
+        page.find_element(By.ID, "add").click()
+        kill = "[...document.querySelectorAll('#processes button')].map((b) => b.textContent)"
+        for name in ("codelets-added-1", "codelets-1"):
+            await_script(page, f"return {kill}.includes('Kill {name}')", f"{name} works")
+
+        find = "[...document.querySelectorAll('#processes button')].find"
+        page.execute_script(f"{find}((b) => b.textContent === 'Kill codelets-1').click()")
+        wait_until(lambda: run.pid_of("codelets-1") not in (before, None), "it runs again")
     run.close()
 
 
@@ -164,8 +235,9 @@ def test_a_dashboard_waits_for_a_system_and_outlives_it(
         page.get(served.address)
         await_script(page, f"return {STATUS} === 'no system runs here'", "it says so")
         page.execute_script("document.getElementById('clear').click()")
-        refused = "document.getElementById('answer').textContent.includes('cogmap run')"
-        await_script(page, f"return {refused}", "a wish is refused with the remedy")
+        await_script(
+            page, f"return {ANSWER}.includes('cogmap run')", "a wish is refused with the remedy"
+        )
 
         for _ in range(2):
             run = start(*PERCEPTS, "--connect", endpoint)

@@ -6,6 +6,9 @@ import { showSystem, showTopics, showMessage } from "/page/system.js";
 import { byId, children, element } from "/page/dom.js";
 
 const RETRY_MS = 1000;
+const KEYS = "uiojklm,. "; // as those of `cogmap teleop`
+const ARROWS = { ArrowUp: "i", ArrowLeft: "j", ArrowRight: "l", ArrowDown: "," };
+const REPEAT_MS = 150; // of a key that is held
 const ASKED_FOR = ["costs", "cuts", "truth"]; // layers that are sent only while they are shown
 // A page rests longer than it draws, so that a slow machine is left to what it shows.
 const RESTS = 9;
@@ -18,6 +21,8 @@ const have = {};
 let playing = null;
 let isSliding = false;
 let isLive = false;
+let isDriving = false;
+let pressedMs = 0;
 let restMs = 0; // what the server asks for
 let now = null;
 let ask = () => {};
@@ -64,7 +69,7 @@ function show(news) {
   restMs = news.rest_ms;
   isLive = news.playing === null;
   byId("player").hidden = isLive;
-  byId("person").hidden = !isLive;
+  byId("person").hidden = byId("workers").hidden = !isLive;
   map.takesGoals = isLive;
   if (!isLive) showPlaying(news.playing);
   for (const [name, part] of Object.entries(news.parts)) {
@@ -84,7 +89,7 @@ const panels = {
   camera: showCamera,
   depth: showDepth,
   mind: showMind,
-  system: showSystem,
+  system: (content) => showSystem(content, isLive ? (kill) => wish({ kill }) : null),
   topics: showTopics,
   cuts: (content) => map.setCuts(content.links),
   streets: (content) => showStreets(content.names),
@@ -161,7 +166,32 @@ async function wish(wanted) {
   });
   say(await response.text(), response.ok);
   ask();
+  return response.ok;
 }
+
+// Keys drive the robot until they are given back; those that are typed into a field do not.
+function drive(drives) {
+  showDriving(drives);
+  press(drives ? "k" : "q");
+}
+
+function showDriving(drives) {
+  isDriving = drives;
+  byId("drive").setAttribute("aria-pressed", drives);
+}
+
+async function press(key) {
+  pressedMs = performance.now();
+  if (!(await wish({ key }))) showDriving(false);
+}
+
+addEventListener("keydown", (event) => {
+  const key = ARROWS[event.key] || event.key;
+  if (!isDriving || event.target.matches("input, select") || !KEYS.includes(key)) return;
+  event.preventDefault();
+  event.stopPropagation();
+  if (!event.repeat || performance.now() - pressedMs > REPEAT_MS) press(key);
+}, true);
 
 function say(sentence, isDone) {
   const answer = byId("answer");
@@ -181,6 +211,8 @@ byId("next").onclick = () => wish({ step: true });
 byId("clear").onclick = () => wish({ clear: true });
 byId("close").onclick = () => wish({ street: byId("street").value, closed: true });
 byId("open").onclick = () => wish({ street: byId("street").value, closed: false });
+byId("add").onclick = () => wish({ adds_worker: true });
+byId("drive").onclick = () => drive(!isDriving);
 byId("play").onclick = () => wish({ play: !playing.is_playing });
 byId("step").onclick = () => wish({ step: true });
 byId("speed").onchange = (event) => wish({ speed: Number(event.target.value) });

@@ -1,7 +1,8 @@
 // Latency by stage, the health of the processes, and messages.
 import { bar, byId, children, element } from "/page/dom.js";
 
-export function showSystem(system) {
+// `kill` is called with the name of a worker; null where none can be killed.
+export function showSystem(system, kill) {
   const longest = Math.max(1, ...system.stages.map((each) => each.compute_ms + each.rest_ms));
   const rows = system.stages.map((each) =>
     bar(each.module, `${(each.compute_ms + each.rest_ms).toFixed(0)} ms`, {
@@ -21,7 +22,13 @@ export function showSystem(system) {
       each.is_silent ? "silent" : each.notes.join("; "),
     ];
     const isBad = each.is_silent || each.lost > 0 || each.rejected > 0;
-    return element("tr", isBad ? { class: "bad" } : {}, cells.map((cell) => element("td", {}, String(cell))));
+    const row = element("tr", isBad ? { class: "bad" } : {}, cells.map((cell) => element("td", {}, String(cell))));
+    if (each.is_worker && kill) {
+      const button = element("button", { type: "button" }, `Kill ${each.instance}`);
+      button.onclick = () => kill(each.instance);
+      row.append(element("td", {}, button));
+    }
+    return row;
   }));
 }
 
