@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import threading
 import time
 from bisect import bisect_right
@@ -174,6 +175,9 @@ class Playback:
         except LogError as error:
             self._failure = str(error)
         self._indexed_ns = self._end_ns
+        # Half a million objects of keyframes stay: to look through them for garbage takes longer
+        # than to show a moment.
+        gc.freeze()
 
     def _play(self) -> None:
         """Show what is asked for, and go on while it plays."""
