@@ -22,6 +22,7 @@ from cogmap.schemas.sensing import View
 MOMENTS = 100
 LOOK_AGAIN_S = 5.0
 SERVES_S = 60.0
+READS_S = 300.0
 # Notes each frame with the time at which the page has shown its image.
 NOTE_FRAMES = """
 window.noted = [];
@@ -51,7 +52,7 @@ FOREIGN = """
 return performance.getEntriesByType('resource').map((each) => each.name)
   .filter((name) => /^(http|ws)/.test(name) && new URL(name).host !== location.host);
 """
-IS_READ = "return !document.getElementById('clock').textContent.includes('% read')"
+IS_READ = "return /^\\S+ of \\S+ s$/.test(document.getElementById('clock').textContent)"
 
 
 def frames_shown_ms(folder: Path, browsers: int) -> tuple[list[float], int, Driven]:
@@ -97,7 +98,7 @@ def slider_ms(log: Path) -> tuple[list[float], int]:
         with browser() as page:
             page.get(address)
             page.set_script_timeout(SERVES_S)
-            _await(page, IS_READ)
+            _await(page, IS_READ, READS_S)
             duration_s = float(page.execute_script("return document.getElementById('time').max"))
             moments_s = np.random.default_rng(1).uniform(0.0, duration_s, MOMENTS).round(1)
             moved_ms = [page.execute_async_script(MOVE_SLIDER, at) for at in moments_s.tolist()]
@@ -117,9 +118,9 @@ def _address(output: Path) -> str:
     raise CogmapError(f"{sys.executable} served no dashboard within {SERVES_S:g} s")
 
 
-def _await(page: Chrome, script: str) -> None:
-    until_s = time.monotonic() + SERVES_S
+def _await(page: Chrome, script: str, limit_s: float) -> None:
+    until_s = time.monotonic() + limit_s
     while not page.execute_script(script):
         if time.monotonic() > until_s:
-            raise CogmapError(f"the page did not come so far within {SERVES_S:g} s: {script}")
+            raise CogmapError(f"the page did not come so far within {limit_s:g} s: {script}")
         time.sleep(LOOK_S)
