@@ -118,7 +118,7 @@ class _Drive:
         """Yield the map as it is now, once there is one."""
         agent = self._graph.agent
         if agent is not None:
-            yield self._moment(agent.stamp_ns, _map_of(self._graph))
+            yield self._moment(agent.stamp_ns, map_of(self._graph))
 
     def _moment(self, stamp_ns: int, content: Any) -> Moment:
         self._stamp_ns = max(stamp_ns, 0)
@@ -160,7 +160,8 @@ class _Drive:
             yield self._moment(self._stamp_ns, Sentence(health.instance, note))
 
 
-def _map_of(graph: Graph) -> Map:
+def map_of(graph: Graph) -> Map:
+    """Return what a graph holds of the root map."""
     rows = rows_of(graph.path)
     plan = graph.get(Plan, PLAN_ID)
     plan_m = None

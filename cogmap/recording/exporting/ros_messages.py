@@ -64,6 +64,19 @@ class RosMessages:
         """Make a time."""
         return self.make("builtin_interfaces/msg/Time", *divmod(stamp_ns, 10**9))
 
+    def line(self, stamp_ns: int, name: str, text: str) -> Any:
+        """Make a line of the log of `name`."""
+        return self.make(
+            "rcl_interfaces/msg/Log",
+            stamp=self.time(stamp_ns),
+            level=self._store.types["rcl_interfaces/msg/Log"].INFO,
+            name=name,
+            msg=text,
+            file="",
+            function="",
+            line=0,
+        )
+
     def header(self, stamp_ns: int, frame: str) -> Any:
         """Make a header."""
         return self.make("std_msgs/msg/Header", self.time(stamp_ns), frame)
@@ -92,6 +105,11 @@ class RosMessages:
         """Make the speeds of a robot on wheels."""
         linear = self.vector(speed_m_s)
         return self.make("geometry_msgs/msg/Twist", linear, self.vector(z=turn_rate_rad_s))
+
+    def stamped_twist(self, header: Any, speed_m_s: float, turn_rate_rad_s: float) -> Any:
+        """Make the speeds of a robot on wheels, with a header."""
+        twist = self.twist(speed_m_s, turn_rate_rad_s)
+        return self.make("geometry_msgs/msg/TwistStamped", header, twist)
 
     def path(self, header: Any, points_m: Floats) -> Any:
         """Make a path of (n, 2) points."""
