@@ -44,6 +44,31 @@ def threadpoolctl() -> Any:
     return threadpoolctl
 
 
+def zenoh_ros2_sdk() -> Any:
+    """Load zenoh-ros2-sdk. Raises UsageError if it, or mcap-ros2-support, is not installed."""
+    try:
+        import mcap_ros2._dynamic  # noqa: F401
+        import zenoh_ros2_sdk.attachment
+        import zenoh_ros2_sdk.entity
+        import zenoh_ros2_sdk.keyexpr
+        import zenoh_ros2_sdk.qos
+        import zenoh_ros2_sdk.utils
+    except ImportError:
+        raise UsageError(f"zenoh-ros2-sdk or mcap-ros2-support {REMEDY}") from None
+
+    return zenoh_ros2_sdk
+
+
+def rosbags_types() -> Any:
+    """Load the types of ROS 2 that rosbags has. Raises UsageError if it is not installed."""
+    try:
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise UsageError(f"rosbags {REMEDY}") from None
+
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
 def gtsam_poses(values: Any, keys: Iterable[int]) -> Floats:
     """Return (n, 3) poses in the plane, of gtsam's `values` at `keys`: x_m, y_m, heading_rad."""
     poses = []

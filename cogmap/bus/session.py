@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_AGENT = "agent"
+START_ROUTER = "start one with `cogmap run` or `cogmap router`, or name its endpoint with --connect"
 # How long a client waits for a router, for one answer of it, and between two attempts; TCP's
 # greatest port.
 CONNECT_TIMEOUT_S = 5.0
@@ -70,6 +71,7 @@ def open_client(
     endpoint: str,
     timeout_s: float = CONNECT_TIMEOUT_S,
     is_asked_to_end: Callable[[], bool] | None = None,
+    remedy: str = START_ROUTER,
 ) -> zenoh.Session:
     """Return a session with the router at `endpoint`. Raises NoRouterError if none answers in
     time.
@@ -91,10 +93,7 @@ def open_client(
     try:
         return zenoh.open(_config("client", **settings))
     except zenoh.ZError:
-        raise NoRouterError(
-            f"no router at {endpoint} within {timeout_s:g} s: start one with `cogmap run` or "
-            f"`cogmap router`, or name its endpoint with --connect"
-        ) from None
+        raise NoRouterError(f"no router at {endpoint} within {timeout_s:g} s: {remedy}") from None
 
 
 def _await_listener(endpoint: str, timeout_s: float, is_asked_to_end: Callable[[], bool]) -> float:

@@ -33,6 +33,7 @@ HEALTH_PERIOD_NS = 1_000_000_000
 RETRY_PERIOD_NS = 500_000_000
 START = "@start"
 TIMER = "@timer"
+OUTSIDE = "@outside"
 
 
 class Shell:
@@ -132,6 +133,13 @@ class Shell:
         for message in messages:
             self.publisher.send(message, computation)
         self.publisher.compact_journal()
+
+    def call(self, handler: Callable[[], Reply]) -> None:
+        """Have the module's own thread call `handler`, for what has come by another way than the
+        bus, and publish what that returns. Any thread may call this.
+        """
+        cause = (OUTSIDE, self.module.instance, 0)
+        self.inbox.call(lambda: self._invoke(lambda: self.module.stamp(handler()), cause))
 
     def close(self) -> None:
         """Leave the bus, and close the files."""

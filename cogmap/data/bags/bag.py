@@ -7,10 +7,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from cogmap.data.bags.order import stamp_ns_of
 from cogmap.errors import UsageError
 
 GIVE = "a bag of ROS 1, the folder of a bag of ROS 2, or an MCAP file of ROS 2"
-NS_PER_S = 1_000_000_000
 
 
 class Place(NamedTuple):
@@ -48,7 +48,7 @@ class Bag:
         """
         with self._whole():
             for log_ns, message in self._between(topic, None, None):
-                yield Place(_stamp_ns(message) or log_ns, log_ns), message
+                yield Place(stamp_ns_of(message) or log_ns, log_ns), message
 
     def unstamped(self, topic: str) -> Iterator[Any]:
         """Yield the messages of a topic without stamps. Raises UsageError as `messages` does."""
@@ -66,9 +66,13 @@ class Bag:
         """Return the message at `place`. Raises UsageError if it cannot be read."""
         with self._whole():
             for _, message in self._between(topic, place.log_ns, place.log_ns + 1):
-                if place.stamp_ns == (_stamp_ns(message) or place.log_ns):
+                if place.stamp_ns == (stamp_ns_of(message) or place.log_ns):
                     return message
         raise UsageError(f"{self.path}: a message on {topic} is gone: leave the bag as it is")
+
+    def setting(self, name: str) -> str:
+        """Return how a user gives a topic, such as that of the `left` images."""
+        return f"--set player.{name}_topic=TOPIC"
 
     def wrong(self, what: str, remedy: str) -> UsageError:
         """Make the error for a bag of which something is not as it must be."""
@@ -99,12 +103,6 @@ class Bag:
                 f"{self.path} is no whole bag ({words}): give {GIVE}; what was cut off may be "
                 "mended by `ros2 bag reindex`, `rosbag reindex` or `mcap recover`"
             ) from None
-
-
-def _stamp_ns(message: Any) -> int:
-    """Return the stamp of a message's header, 0 if nobody set it."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
 
 
 def _library() -> tuple[Any, Any]:

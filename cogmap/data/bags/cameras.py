@@ -8,9 +8,10 @@ import cv2
 import msgspec
 import numpy as np
 
-from cogmap.data.camera_pair import Camera, Maps, maps_of
+from cogmap.data.bags.mount import Mount
+from cogmap.data.camera_pair import Camera, Maps, maps_of, remapped
 from cogmap.errors import UsageError
-from cogmap.geometry.arrays import Floats
+from cogmap.geometry.arrays import Bytes, Floats
 from cogmap.schemas.sensing import Calibration
 
 MODELS = ("", "plumb_bob", "rational_polynomial")
@@ -21,6 +22,12 @@ NUMBERS = 5
 
 CALIBRATE = "calibrate both cameras together, as camera_calibration does, and record it again"
 NOWHERE = np.eye(4)
+
+RECTIFIED = "image_rect"
+"""In the name of a topic: its images are rectified, as image_proc does it."""
+
+HEIGHT_M = 1.0
+"""How high cameras stand of which nothing says it: as high as a hand holds them."""
 
 
 class CameraInfo(NamedTuple):
@@ -51,6 +58,32 @@ class Pair(NamedTuple):
 
     calibration: Calibration
     maps: tuple[Maps, Maps] | None
+
+    def undistorted(self, left: Bytes, right: Bytes) -> tuple[Bytes, Bytes]:
+        """Return the images, rectified if the calibration does not say how."""
+        if self.maps is None:
+            return left, right
+        return remapped(left, self.maps[0]), remapped(right, self.maps[1])
+
+
+def check_size(image: Bytes, calibration: Calibration, name: str) -> None:
+    """Raise UsageError if an image, called `name`, is not of the calibration's size."""
+    size = (calibration.height_px, calibration.width_px)
+    if image.shape[:2] != size:
+        raise UsageError(
+            f"{name} is {image.shape[1]} x {image.shape[0]}, its CameraInfo says {size[1]} x "
+            f"{size[0]}: record the calibration of these images"
+        )
+
+
+def mounted(mount: Mount, height_m: float) -> dict[str, float]:
+    """Return where the left camera stands, as Calibration names that; `height_m` is 0 where the
+    mount says it.
+    """
+    return {
+        "mount_height_m": height_m or max(float(mount.place_m[2]), 0.0) or HEIGHT_M,
+        "mount_forward_m": float(mount.place_m[0]),
+    }
 
 
 def camera_of(info: Any) -> CameraInfo:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,8 +34,18 @@ def mount_of(bag: Bag, frame: str) -> Mount:
     above: dict[str, Any] = {}
     if bag.topics.get(STATIC) == TRANSFORMS:
         for message in bag.unstamped(STATIC):
-            above.update({_name(each.child_frame_id): each for each in message.transforms})
+            above.update(steps_of(message))
+    return mount_by(above, frame)
 
+
+def steps_of(message: Any) -> dict[str, Any]:
+    """Return the transforms of a TFMessage by the frame that each places."""
+    return {_name(each.child_frame_id): each for each in message.transforms}
+
+
+def mount_by(transforms: Mapping[str, Any], frame: str) -> Mount:
+    """Return where a sensor's frame is by static transforms, as `steps_of` returns them."""
+    above = dict(transforms)
     mount = Mount(Rotation.identity(), np.zeros(3))
     name = _name(frame)
     while name in above:

@@ -84,7 +84,7 @@ def read_odometry(bag: Bag, topic: str) -> tuple[Poses | None, list[str]]:
     numbers = []
     for place, message in bag.messages(topic):
         stamps.append(place.stamp_ns)
-        numbers.append([*_pose(message.pose.pose), *_speeds(message.twist.twist)])
+        numbers.append([*pose_of(message.pose.pose), *speeds_of(message.twist.twist)])
     rows = np.array(numbers, np.float64).reshape(-1, 5)
 
     is_finite = np.isfinite(rows).all(axis=1)
@@ -102,14 +102,16 @@ def read_odometry(bag: Bag, topic: str) -> tuple[Poses | None, list[str]]:
     return Poses(stamps_ns[order], rows[order, :3], rows[order, 3:]), notes
 
 
-def _pose(pose: Any) -> tuple[float, float, float]:
+def pose_of(pose: Any) -> tuple[float, float, float]:
+    """Return x_m, y_m and heading_rad of a Pose."""
     turn = pose.orientation
     across = turn.w * turn.z + turn.x * turn.y
     along = 0.5 - turn.y**2 - turn.z**2
     return pose.position.x, pose.position.y, float(np.arctan2(across, along))
 
 
-def _speeds(twist: Any) -> tuple[float, float]:
+def speeds_of(twist: Any) -> tuple[float, float]:
+    """Return the speed ahead and the turn rate of a Twist, in m/s and rad/s."""
     return twist.linear.x, twist.angular.z
 
 

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Indices
 
+NS_PER_S = 1_000_000_000
+
 LATE_NS = 1_000_000_000
 """Messages may overtake each other by so much; a stamp that goes back farther is of another clock,
 or of another drive.
 """
+
+
+def stamp_ns_of(message: Any) -> int:
+    """Return the stamp of a message's header, 0 if nobody set it."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
 
 
 def in_order(stamps_ns: Indices, source: str) -> tuple[Indices, list[str]]:

@@ -8,32 +8,25 @@ from dataclasses import dataclass
 import numpy as np
 
 from cogmap.data.bags.bag import Bag, Place
-from cogmap.data.bags.cameras import Pair, camera_of, pair_of
+from cogmap.data.bags.cameras import RECTIFIED, Pair, camera_of, check_size, mounted, pair_of
 from cogmap.data.bags.images import image_of
 from cogmap.data.bags.mount import mount_of
 from cogmap.data.bags.odometry import Motions, Poses, read_odometry
 from cogmap.data.bags.order import in_order
 from cogmap.data.bags.topics import (
     LASER_SCAN,
-    SET_PAIR,
     Topics,
     camera_info,
     odometry_of,
     pair_of_topics,
+    set_pair,
 )
-from cogmap.data.camera_pair import remapped
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Bytes, Indices
 from cogmap.schemas.sensing import Calibration
 
 SAME_VIEW_NS = 5_000_000
 """The stamps of a pair differ by so much at most: cameras are triggered together."""
-
-RECTIFIED = "image_rect"
-"""In the name of a topic: its images are rectified, as image_proc does it."""
-
-HEIGHT_M = 1.0
-"""How high cameras stand of which nothing says it: as high as a hand holds them."""
 
 TRIED = 20
 """A bag of which none of so many pairs can be read is not played."""
@@ -81,23 +74,13 @@ class PairRecording:
                 f"{self.bag.path}: left image {number} has no right one within "
                 f"{SAME_VIEW_NS / 1e6:g} ms: record both cameras"
             )
-        images = (
-            self._image(self.topics[0], self.left[number], number),
-            self._image(self.topics[1], right, number),
-        )
-        if self.camera.maps is None:
-            return images
-        return remapped(images[0], self.camera.maps[0]), remapped(images[1], self.camera.maps[1])
+        left = self._image(self.topics[0], self.left[number], number)
+        return self.camera.undistorted(left, self._image(self.topics[1], right, number))
 
     def _image(self, topic: str, place: Place, number: int) -> Bytes:
         name = f"{self.bag.path}: image {number} of {topic}"
         image = image_of(self.bag.message(topic, place), name)
-        size = (self.calibration.height_px, self.calibration.width_px)
-        if image.shape[:2] != size:
-            raise UsageError(
-                f"{name} is {image.shape[1]} x {image.shape[0]}, its CameraInfo says {size[1]} x "
-                f"{size[0]}: record the calibration of these images"
-            )
+        check_size(image, self.calibration, name)
         return image
 
 
@@ -139,11 +122,7 @@ def read_pairs(bag: Bag, given: Topics, height_m: float = 0.0) -> PairRecording:
 
 def _camera(bag: Bag, topics: tuple[str, str], height_m: float) -> Pair:
     left, right = (camera_of(bag.first(camera_info(bag, name))) for name in topics)
-    place_m = mount_of(bag, left.frame).place_m
-    mount = {
-        "mount_height_m": height_m or max(float(place_m[2]), 0.0) or HEIGHT_M,
-        "mount_forward_m": float(place_m[0]),
-    }
+    mount = mounted(mount_of(bag, left.frame), height_m)
     is_rectified = all(RECTIFIED in name for name in topics)
     return pair_of(left, right, is_rectified, mount, str(bag.path))
 
@@ -152,7 +131,7 @@ def _places(bag: Bag, topic: str) -> tuple[list[Place], list[str]]:
     """Return where the images of a topic are, in order of time, and what is left out."""
     found = [place for place, _ in bag.messages(topic)]
     if not found:
-        raise bag.wrong(f"has no message on {topic}", SET_PAIR)
+        raise bag.wrong(f"has no message on {topic}", set_pair(bag))
     order, notes = in_order(_stamps_ns(found), f"{bag.path}: {topic}")
     return [found[index] for index in order.tolist()], notes
 

@@ -80,13 +80,13 @@ class RosDrive:
     """Turns the moments of a drive into messages of ROS, made by `ros`.
 
     `odometry` is the pose of the robot in the frame of the odometry, (3,): motions that are shown
-    add up to it; who knows it otherwise sets it.
+    add up to it; who knows it otherwise sets it, and `frames`.
     """
 
     def __init__(self, ros: RosMessages, frames: Frames = FRAMES) -> None:
         self.odometry: Floats = np.zeros(3)
         self._ros = ros
-        self._frames = frames
+        self.frames = frames
         self._stamp_ns = 0
         self._has_mount = False
         self._has_moved = False
@@ -125,7 +125,7 @@ class RosDrive:
             aside_m = (camera.baseline_m, 0.0, 0.0)
             yield self._transforms(
                 STATIC_TRANSFORMS,
-                self._transform(self._frames.robot, LEFT, forward_m, OPTICAL_AXES),
+                self._transform(self.frames.robot, LEFT, forward_m, OPTICAL_AXES),
                 self._transform(LEFT, RIGHT, aside_m, tuple(right)),
             )
 
@@ -147,7 +147,7 @@ class RosDrive:
         yield "/camera/depth/camera_info", self._ros.left_camera(header, view.calibration)
 
     def _scan(self, scan: RangeScan) -> Iterator[Shown]:
-        yield "/scan", self._ros.points(self._header(self._frames.robot), points_of(scan))
+        yield "/scan", self._ros.points(self._header(self.frames.robot), points_of(scan))
 
     def _motion(self, moved: Odometry) -> Iterator[Shown]:
         """Yield the pose by odometry alone; before the first motion, that in which it began."""
@@ -167,20 +167,20 @@ class RosDrive:
         twist = self._ros.twist(moved.speed_m_s, moved.turn_rate_rad_s)
         message = self._ros.make(
             "nav_msgs/msg/Odometry",
-            header=self._header(self._frames.odometry),
-            child_frame_id=self._frames.robot,
+            header=self._header(self.frames.odometry),
+            child_frame_id=self.frames.robot,
             pose=self._ros.pose_with_covariance(pose, (0.0, 0.0, 0.0)),
             twist=self._ros.make("geometry_msgs/msg/TwistWithCovariance", twist, np.zeros(36)),
         )
         yield "/odom", message
         place_m = (x_m, y_m, 0.0)
         placed = self._transform(
-            self._frames.odometry, self._frames.robot, place_m, turned(heading_rad)
+            self.frames.odometry, self.frames.robot, place_m, turned(heading_rad)
         )
         yield self._transforms(TRANSFORMS, placed)
 
     def _command(self, command: MotorCommand) -> Iterator[Shown]:
-        header = self._header(self._frames.robot)
+        header = self._header(self.frames.robot)
         yield COMMANDS, self._ros.stamped_twist(header, *speeds_of(command))
 
     def _pose(self, agent: Self) -> Iterator[Shown]:
@@ -188,7 +188,7 @@ class RosDrive:
         sds = (agent.x_sd_m, agent.y_sd_m, agent.heading_sd_rad)
         message = self._ros.make(
             "geometry_msgs/msg/PoseWithCovarianceStamped",
-            self._header(self._frames.map),
+            self._header(self.frames.map),
             self._ros.pose_with_covariance(pose, sds),
         )
         yield POSE, message
@@ -199,7 +199,7 @@ class RosDrive:
         x_m, y_m, heading_rad = origin.tolist()
         place_m = (x_m, y_m, 0.0)
         placed = self._transform(
-            self._frames.map, self._frames.odometry, place_m, turned(heading_rad)
+            self.frames.map, self.frames.odometry, place_m, turned(heading_rad)
         )
         yield self._transforms(TRANSFORMS, placed)
 
@@ -212,7 +212,7 @@ class RosDrive:
         yield "/truth", self._ros.pose_stamped(header, pose.x_m, pose.y_m, pose.heading_rad)
 
     def _map(self, known: Map) -> Iterator[Shown]:
-        header = self._header(self._frames.map)
+        header = self._header(self.frames.map)
         yield PATH, self._ros.path(header, known.path_m)
         if known.plan_m is not None:
             yield PLAN, self._ros.path(header, known.plan_m)
@@ -222,7 +222,7 @@ class RosDrive:
 
     def _objects(self, nodes: list[Object]) -> Any:
         """Make markers of all objects, after one that removes those of before."""
-        header = self._header(self._frames.map)
+        header = self._header(self.frames.map)
         markers = [self._ros.no_markers(header)]
         for number, node in enumerate(nodes):
             place_m = (node.x_m, node.y_m)
@@ -240,7 +240,7 @@ class RosDrive:
         obstacle = known.places.column(PlaceColumn.OBSTACLE).T
         is_known = (obstacle > 0) | (known.places.column(PlaceColumn.ROAD).T > 0)
         percent = np.where(is_known, np.rint(100 * obstacle.clip(0, 1)), -1)
-        header = self._header(self._frames.map)
+        header = self._header(self.frames.map)
         return self._ros.grid(header, percent.astype(np.int8), known.cell_m, known.corner_m)
 
 

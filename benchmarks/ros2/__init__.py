@@ -1,0 +1,1 @@
+"""How soon and how wholly messages pass between a robot of ROS 2 and our bus."""
