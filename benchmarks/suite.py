@@ -39,6 +39,7 @@ from benchmarks.real import measure as real
 from benchmarks.real import places as real_places
 from benchmarks.real import stereo as real_stereo
 from benchmarks.report import Metrics, Outcome, with_machine_unit
+from benchmarks.ros2 import measure as ros2
 from benchmarks.spiking import measure as spiking
 from cogmap.errors import CogmapError, UsageError
 from cogmap.parallel import end_workers, exit_with
@@ -161,6 +162,7 @@ SUITE = (
     Benchmark("lifelong", lifelong.THRESHOLDS, lifelong.measure, options=lifelong.OPTIONS),
     Benchmark("dashboard", dashboard.THRESHOLDS, dashboard.measure, options=dashboard.OPTIONS),
     Benchmark("export", export.THRESHOLDS, export.measure, options=export.OPTIONS),
+    Benchmark("ros2", ros2.THRESHOLDS, ros2.measure),
     Benchmark("log_api", log_api.THRESHOLDS, log_api.measure, options=log_api.OPTIONS),
     Benchmark(
         "cue-integration",

@@ -26,6 +26,7 @@ from cogmap.cli.launch.outcome import Ending, Outcome
 from cogmap.cli.launch.watch import Watch
 from cogmap.cli.run.folder import SUMMARY_NAME
 from cogmap.recording.storage.format import LOG_NAME
+from cogmap.schemas.sensing import SpeedLimit
 
 MAP_NAME = "map.png"
 NAMED = 8
@@ -126,7 +127,9 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
 
 def _played(metrics: DriveMetrics) -> str:
     """Write what was played, and what of it was left out."""
-    played = f"{metrics.recording}, {metrics.views} views; commands moved nothing in it"
+    played = f"{metrics.recording}, {metrics.views} views"
+    if SpeedLimit.RECORDING in metrics.halted:
+        played = f"{played}; commands moved nothing in it"
     if metrics.skipped:
         played = f"{played}; {metrics.skipped} left out"
     return "\n".join([played, *map(escape, metrics.skipped_reasons)])
