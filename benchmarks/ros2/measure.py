@@ -48,7 +48,7 @@ class Mind:
     def on_frame(self, frame: StereoFrame) -> MotorCommand:
         """Answer a view."""
         arrived_ns = time.monotonic_ns()
-        number = robot.number_of(frame.left.numpy())
+        number = robot.number_of(np.asarray(frame.left.numpy(), np.uint8))
         self.views_ns[number] = arrived_ns
         wheel_rad_s = number * robot.COUNTED_M_S / WHEEL_RADIUS_M
         command = MotorCommand(

@@ -49,7 +49,10 @@ class Stamps:
         return stamp_ns + (self._offset_ns or 0)
 
     def now_ns(self, wall_ns: int) -> int:
-        """Return the run's time at `wall_ns`; it never goes back."""
+        """Return the run's time at `wall_ns`; it never goes back, and is 0 until there is a stamp."""
+        if self._offset_ns is None:
+            return 0
+
         passed_ns = max(0, wall_ns - self._arrived_ns)
         self._now_ns = max(self._now_ns, self._newest_ns + passed_ns)
         return self._now_ns

@@ -19,6 +19,14 @@ def test_time_begins_with_the_first_stamp_and_leads_back() -> None:
     assert stamps.on_robot(LEAD_NS + S) == DAY + S
 
 
+def test_no_time_passes_before_the_first_stamp() -> None:
+    stamps = Stamps()
+
+    assert stamps.now_ns(77_000 * S) == 0
+    stamps.of(DAY, 77_001 * S)
+    assert stamps.now_ns(77_001 * S) == LEAD_NS
+
+
 def test_time_passes_between_stamps_and_never_goes_back() -> None:
     stamps = Stamps()
     stamps.of(DAY, wall_ns=10 * S)
