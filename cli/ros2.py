@@ -12,6 +12,7 @@ from cogmap.cli.topic.observing import inspect_system
 from cogmap.data.bags.topics import Topics
 from cogmap.errors import UsageError
 from cogmap.ros2.bridge import Options
+from cogmap.ros2.encoders import WheelJoints
 from cogmap.ros2.process import Place, run_bridge
 from cogmap.ros2.rmw.keys import MAX_DOMAIN
 from cogmap.ros2.rmw.types import DISTROS, NEWEST
@@ -51,6 +52,32 @@ def _remapped(
             raise UsageError(f"--remap {each!r}: write it as ROS does, cmd_vel:=base/cmd_vel")
         names[match[1]] = match[2]
     return names
+
+
+def _joints(
+    context: click.Context, option: click.Parameter, given: str | None
+) -> tuple[str, str] | None:
+    if given is None:
+        return None
+    left, comma, right = given.partition(",")
+    if not (left and comma and right):
+        raise UsageError(
+            f"--wheel-joints {given!r}: write it as left_wheel_joint,right_wheel_joint"
+        )
+    return left, right
+
+
+def _wheels(
+    joints: tuple[str, str] | None, radius_m: float | None, track_m: float | None
+) -> WheelJoints | None:
+    """Return what is given of the wheels. Raises UsageError if that is a part only."""
+    if joints is None and radius_m is None and track_m is None:
+        return None
+    if joints is None or radius_m is None or track_m is None:
+        raise UsageError(
+            "--wheel-joints, --wheel-radius and --wheel-track belong together: give all three"
+        )
+    return WheelJoints(*joints, radius_m, track_m)
 
 
 @click.command(epilog=_EPILOG)
@@ -95,6 +122,24 @@ def _remapped(
 @click.option("--odometry-topic", default="", help="Odometry.  [default: the only one]")
 @click.option("--scan-topic", default="", help="Scans of a laser, where there are no cameras.")
 @click.option("--no-odometry", is_flag=True, help="Use none: views tell the motion.")
+@click.option(
+    "--wheel-joints",
+    callback=_joints,
+    metavar="LEFT,RIGHT",
+    help="The joints of the wheels, whose turns joint_states tells; in the place of odometry.",
+)
+@click.option(
+    "--wheel-radius",
+    "radius_m",
+    type=FiniteRange(0, 5, min_open=True),
+    help="Radius of these wheels, in m.",
+)
+@click.option(
+    "--wheel-track",
+    "track_m",
+    type=FiniteRange(0, 10, min_open=True),
+    help="Distance between these wheels, in m.",
+)
 @click.option(
     "--mount-height",
     "mount_height_m",
@@ -150,6 +195,9 @@ def ros2(
     odometry_topic: str,
     scan_topic: str,
     no_odometry: bool,
+    wheel_joints: tuple[str, str] | None,
+    radius_m: float | None,
+    track_m: float | None,
     mount_height_m: float,
     rate_hz: float,
     speed_m_s: float,
@@ -180,6 +228,7 @@ def ros2(
     options = Options(
         topics=Topics(left_topic, right_topic, odometry_topic, scan_topic),
         has_odometry=not no_odometry,
+        joints=_wheels(wheel_joints, radius_m, track_m),
         mount_height_m=mount_height_m,
         rate_hz=rate_hz,
         limits=None if watch_only else Limits(speed_m_s, turn_rate_rad_s, hold_s),

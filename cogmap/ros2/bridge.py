@@ -8,9 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from cogmap.data.bags.topics import Topics
+from cogmap.data.bags.topics import ODOMETRY, Topics
 from cogmap.errors import MessageError, UsageError
 from cogmap.recording.exporting import ros_drive
+from cogmap.ros2.encoders import JOINT_STATE, WheelJoints
 from cogmap.ros2.graph import SETTLED_NS, Chosen, RosGraph, chosen
 from cogmap.ros2.rmw.keys import LATCHED, USUAL, Seen, absolute
 from cogmap.ros2.rmw.node import Publisher, RosNode, Take
@@ -49,17 +50,26 @@ log = logging.getLogger("cogmap")
 @dataclass(frozen=True)
 class Options:
     """What a user says of a robot: the topics of its senses, empty where they are found; whether it
-    has odometry; the height of its cameras, 0 where it tells that; how many views a second are
-    wanted; and what may be asked of it, None if nothing. `names` are other names of our topics.
+    has odometry, or the joints of its wheels instead; the height of its cameras, 0 where it tells
+    that; how many views a second are wanted; and what may be asked of it, None if nothing. `names`
+    are other names of our topics.
     """
 
     topics: Topics
     has_odometry: bool
+    joints: WheelJoints | None
     mount_height_m: float
     rate_hz: float
     limits: Limits | None
     namespace: str
     names: dict[str, str]
+
+    @property
+    def odometry_kind(self) -> str:
+        """Return the type of the messages of the wheels, empty if there are none."""
+        if self.joints is not None:
+            return JOINT_STATE
+        return ODOMETRY if self.has_odometry else ""
 
     def name_of(self, topic: str) -> str:
         """Return the whole name of a topic of ours, such as `/map`; `/tf` is in no namespace."""
@@ -160,7 +170,7 @@ class Bridge:
         """Choose topics and subscribe to them; if that cannot be done yet, say why."""
         options = self._options
         try:
-            found = chosen(self._graph, options.topics, options.has_odometry)
+            found = chosen(self._graph, options.topics, options.odometry_kind)
         except UsageError as error:
             if str(error) != self._problem:
                 self._problem = str(error)
@@ -170,7 +180,8 @@ class Bridge:
         self._problem = ""
         log.info("senses: %s", ", ".join(_named(found)))
         period_ns = round(1e9 / options.rate_hz * EARLY)
-        senses = Senses(found, self._graph.topics, options.mount_height_m, period_ns)
+        kinds = self._graph.topics
+        senses = Senses(found, kinds, options.mount_height_m, period_ns, options.joints)
         self.senses = senses
         for wanted in senses.wanted():
             self._subscribe(senses, wanted)

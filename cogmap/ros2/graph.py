@@ -79,21 +79,24 @@ class Chosen(NamedTuple):
     scan: str = ""
 
 
-def chosen(graph: RosGraph, given: Topics, has_odometry: bool) -> Chosen:
+def chosen(graph: RosGraph, given: Topics, odometry_kind: str) -> Chosen:
     """Choose the topics of a robot's senses: those that are given, else those that can be meant.
 
-    Raises UsageError if there is neither a pair of cameras with their calibration nor a laser, if
-    odometry is missing though it `has_odometry`, or if several can be meant.
+    Odometry is of type `odometry_kind`, empty if there is none. Raises UsageError if there is
+    neither a pair of cameras with their calibration nor a laser, if odometry is missing, or if
+    several can be meant.
     """
-    odometry = odometry_of(graph, given.odometry) if has_odometry else ""
-    if has_odometry and not odometry:
+    odometry = ""
+    if odometry_kind:
+        odometry = odometry_of(graph, given.odometry, odometry_kind)
+    if odometry_kind and not odometry:
         raise graph.wrong(
-            "publishes no nav_msgs/msg/Odometry",
+            f"publishes no {odometry_kind}",
             "start what does, or leave it out by --no-odometry: views tell the motion then",
         )
     if (given.scan or graph.of_kind(LASER_SCAN)) and not has_pair(graph, given):
         if not odometry:
-            raise graph.wrong("has laser scans, and no odometry", "publish nav_msgs/msg/Odometry")
+            raise graph.wrong("has laser scans, and no odometry", "leave --no-odometry out")
         return Chosen(odometry=odometry, scan=scans_of(graph, given.scan))
 
     left, right = pair_of_topics(graph, given)

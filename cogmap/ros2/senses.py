@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -13,9 +13,11 @@ import numpy as np
 from cogmap.data.bags.mount import STATIC, TRANSFORMS, steps_of
 from cogmap.data.bags.odometry import pose_of, speeds_of
 from cogmap.data.bags.order import stamp_ns_of
-from cogmap.data.bags.topics import CAMERA_INFO, LASER_SCAN, ODOMETRY
+from cogmap.data.bags.topics import CAMERA_INFO, LASER_SCAN
+from cogmap.geometry.arrays import Floats
 from cogmap.recording.exporting.ros_drive import FRAMES, Frames
 from cogmap.ros2.cameras import SIDES, StereoStream
+from cogmap.ros2.encoders import Encoders, WheelJoints
 from cogmap.ros2.graph import Chosen
 from cogmap.ros2.lasers import ScanStream
 from cogmap.ros2.rmw.keys import LATCHED, SENSOR, USUAL, Quality
@@ -46,11 +48,21 @@ class Senses:
     """
 
     def __init__(
-        self, chosen: Chosen, kinds: dict[str, str], height_m: float, period_ns: int
+        self,
+        chosen: Chosen,
+        kinds: Mapping[str, str],
+        height_m: float,
+        period_ns: int,
+        joints: WheelJoints | None = None,
     ) -> None:
         self.stamps = Stamps()
-        self.odometry = OdometryStream(chosen.odometry) if chosen.odometry else None
-        self.frames: Frames = FRAMES
+        self.odometry: OdometryStream | None = None
+        if chosen.odometry:
+            self.odometry = OdometryStream(chosen.odometry, kinds[chosen.odometry])
+        # A frame of odometry is the robot's own if nobody publishes another one.
+        self.frames = FRAMES._replace(odometry=FRAMES.robot)
+        self._has_frame = False
+        self._encoders = None if joints is None else Encoders(joints)
         self.views = 0
         self._skipped: Counter[str] = Counter()
         self._chosen = chosen
@@ -65,7 +77,10 @@ class Senses:
         chosen = self._chosen
         wanted = [Wanted(STATIC, TRANSFORMS, LATCHED._replace(depth=100), self._on_transforms)]
         if chosen.odometry:
-            wanted.append(Wanted(chosen.odometry, ODOMETRY, Quality(depth=100), self._on_odometry))
+            is_ticks = self._encoders is not None
+            receive = self._on_joints if is_ticks else self._on_odometry
+            kind = self._kinds[chosen.odometry]
+            wanted.append(Wanted(chosen.odometry, kind, Quality(depth=100), receive))
         if chosen.scan:
             wanted.append(Wanted(chosen.scan, LASER_SCAN, SENSOR, self._on_scan))
             return wanted
@@ -79,6 +94,12 @@ class Senses:
                 Wanted(name, self._kinds[name], USUAL, image),
             ]
         return wanted
+
+    def pose_in_odometry(self, stamp_ns: int) -> Floats:
+        """Return the pose (3,) of the robot in the frame of its odometry, at a time of the run."""
+        if self.odometry is None or not self._has_frame:
+            return np.zeros(3)
+        return self.odometry.pose_at(stamp_ns)
 
     def played(self, wall_ns: int, name: str) -> Playback:
         """Return how many views there were of the robot `name`, and why others were left out."""
@@ -118,6 +139,16 @@ class Senses:
         odometry = message.header.frame_id.removeprefix("/") or FRAMES.odometry
         robot = message.child_frame_id.removeprefix("/") or FRAMES.robot
         self.frames = Frames(odometry=odometry, robot=robot)
+        self._has_frame = True
+        return []
+
+    def _on_joints(self, message: Any, wall_ns: int) -> list[Message]:
+        assert self.odometry is not None
+        assert self._encoders is not None
+        stamp_ns = self.stamps.of(stamp_ns_of(message), wall_ns)
+        rolled = self._encoders.on_joints(stamp_ns, message)
+        if rolled is not None:
+            self.odometry.on_pose(stamp_ns, *rolled)
         return []
 
     def _on_image(self, side: int, message: Any, wall_ns: int) -> list[Message]:

@@ -43,8 +43,7 @@ class Showing:
         if agent is None or senses is None or not _has_pose(delta):
             return
 
-        if senses.odometry is not None:
-            self._drive.odometry = senses.odometry.pose_at(agent.stamp_ns)
+        self._drive.odometry = senses.pose_in_odometry(agent.stamp_ns)
         self._drive.frames = senses.frames
         stamp_ns = senses.stamps.on_robot(agent.stamp_ns)
         shown = list(self._drive.shown(stamp_ns, agent))

@@ -49,7 +49,7 @@ class Stamps:
         return stamp_ns + (self._offset_ns or 0)
 
     def now_ns(self, wall_ns: int) -> int:
-        """Return the run's time at `wall_ns`; it never goes back, and is 0 until there is a stamp."""
+        """Return the run's time at `wall_ns`; it never goes back, and is 0 before a stamp came."""
         if self._offset_ns is None:
             return 0
 

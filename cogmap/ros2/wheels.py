@@ -34,15 +34,16 @@ class _Sample(NamedTuple):
 
 
 class OdometryStream:
-    """The wheels' motions from the poses on `topic`, gapless from view to view.
+    """The wheels' motions from the poses on `topic`, of type `kind`, gapless from view to view.
 
     A view does not wait for the pose after it: the last speeds are taken to hold until then, and
     the next motion leads from there to where the robot really came to be, so that no error adds up.
     """
 
-    def __init__(self, topic: str) -> None:
+    def __init__(self, topic: str, kind: str) -> None:
         self.jumps = 0
         self._topic = topic
+        self._kind = kind
         self._samples: deque[_Sample] = deque(maxlen=REMEMBERED)
         self._told: _Sample | None = None
 
@@ -114,8 +115,8 @@ class OdometryStream:
     def _check(self, view_ns: int) -> None:
         if not self._samples:
             raise UsageError(
-                f"nothing has come on {self._topic} (nav_msgs/msg/Odometry): start what publishes "
-                "it, or leave it out by --no-odometry"
+                f"nothing of the robot's wheels has come on {self._topic} ({self._kind}): start "
+                "what publishes it, or leave it out by --no-odometry"
             )
         behind_ns = view_ns - self._samples[-1].stamp_ns
         if behind_ns > STALE_NS:

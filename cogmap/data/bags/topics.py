@@ -76,11 +76,11 @@ def has_pair(source: Source, given: Topics) -> bool:
     return bool(given.left or given.right or _pairs(source, given))
 
 
-def odometry_of(source: Source, given: str) -> str:
-    """Return the topic of odometry, empty if there is none. Raises UsageError if the one that is
-    given is missing, or there are several.
+def odometry_of(source: Source, given: str, kind: str = ODOMETRY) -> str:
+    """Return the topic of odometry, which has messages of type `kind`; empty if there is none.
+    Raises UsageError if the one that is given is missing, or there are several.
     """
-    return _only(source, given, ODOMETRY, source.setting("odometry"))
+    return _only(source, given, kind, source.setting("odometry"))
 
 
 def scans_of(source: Source, given: str) -> str:

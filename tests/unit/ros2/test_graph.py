@@ -26,7 +26,7 @@ def graph(publishers: dict[str, str]) -> RosGraph:
 
 
 def test_a_pair_is_found_with_its_calibrations_and_the_odometry() -> None:
-    found = chosen(graph(CAMERAS | {"/odom": ODOMETRY}), NONE, has_odometry=True)
+    found = chosen(graph(CAMERAS | {"/odom": ODOMETRY}), NONE, ODOMETRY)
 
     assert found == Chosen(
         ("/left/image_raw", "/right/image_raw"),
@@ -36,7 +36,7 @@ def test_a_pair_is_found_with_its_calibrations_and_the_odometry() -> None:
 
 
 def test_a_laser_is_found_where_there_are_no_cameras() -> None:
-    found = chosen(graph({"/scan": LASER_SCAN, "/odom": ODOMETRY}), NONE, has_odometry=True)
+    found = chosen(graph({"/scan": LASER_SCAN, "/odom": ODOMETRY}), NONE, ODOMETRY)
 
     assert found == Chosen(odometry="/odom", scan="/scan")
 
@@ -92,9 +92,9 @@ def test_what_is_missing_is_named_with_what_there_is_and_the_remedy(
     publishers: dict[str, str], given: Topics, sentence: str
 ) -> None:
     with pytest.raises(UsageError, match=sentence):
-        chosen(graph(publishers), given, has_odometry=True)
+        chosen(graph(publishers), given, ODOMETRY)
 
 
 def test_scans_without_odometry_are_refused() -> None:
     with pytest.raises(UsageError, match="has laser scans, and no odometry"):
-        chosen(graph({"/scan": LASER_SCAN}), NONE, has_odometry=False)
+        chosen(graph({"/scan": LASER_SCAN}), NONE, "")

@@ -32,7 +32,7 @@ class Robot:
     """Sends messages to Senses."""
 
     def __init__(self, chosen: Chosen = CAMERAS, period_ns: int = S // 10) -> None:
-        kinds = {LEFT: IMAGE, RIGHT: IMAGE}
+        kinds = {LEFT: IMAGE, RIGHT: IMAGE, "/odom": ODOMETRY}
         self.senses = Senses(chosen, kinds, height_m=0.0, period_ns=period_ns)
         self._receive = {wanted.topic: wanted.receive for wanted in self.senses.wanted()}
 

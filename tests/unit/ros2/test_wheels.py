@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from cogmap.data.bags.topics import ODOMETRY
 from cogmap.errors import UsageError
 from cogmap.geometry.se2 import compose
 from cogmap.recording.exporting.ros_drive import arc_of
@@ -26,7 +27,7 @@ def rows(moved: list[Odometry]) -> list[tuple[float, float, float]]:
 
 
 def test_a_motion_ends_at_each_view_between_two_poses() -> None:
-    stream = OdometryStream("/odom")
+    stream = OdometryStream("/odom", ODOMETRY)
     straight(stream, 1.0, 1.5, 2.0)
 
     assert stream.until(round(1.25 * S)) == []
@@ -37,7 +38,7 @@ def test_a_motion_ends_at_each_view_between_two_poses() -> None:
 
 
 def test_a_view_that_is_newer_than_the_last_pose_does_not_wait() -> None:
-    stream = OdometryStream("/odom")
+    stream = OdometryStream("/odom", ODOMETRY)
     straight(stream, 1.0)
     stream.until(S)
     straight(stream, 1.1)
@@ -49,7 +50,7 @@ def test_a_view_that_is_newer_than_the_last_pose_does_not_wait() -> None:
 
 
 def test_no_error_adds_up_where_speeds_were_wrong() -> None:
-    stream = OdometryStream("/odom")
+    stream = OdometryStream("/odom", ODOMETRY)
     straight(stream, 1.0, speeds=np.array([9.0, 0.0]))
     stream.until(S)
     moved = []
@@ -66,7 +67,7 @@ def test_no_error_adds_up_where_speeds_were_wrong() -> None:
 
 
 def test_poses_that_nobody_fills_in_are_those_to_which_the_speeds_lead() -> None:
-    stream = OdometryStream("/odom")
+    stream = OdometryStream("/odom", ODOMETRY)
     for at_s in (1, 2, 3):
         stream.on_pose(at_s * S, np.zeros(3), AHEAD)
 
@@ -74,7 +75,7 @@ def test_poses_that_nobody_fills_in_are_those_to_which_the_speeds_lead() -> None
 
 
 def test_a_jump_is_left_out_and_counted() -> None:
-    stream = OdometryStream("/odom")
+    stream = OdometryStream("/odom", ODOMETRY)
     straight(stream, 1.0)
     stream.until(S)
     stream.on_pose(round(1.1 * S), np.array([900.0, 0.0, 0.0]), AHEAD)
@@ -86,15 +87,15 @@ def test_a_jump_is_left_out_and_counted() -> None:
 
 
 def test_a_pose_that_is_older_than_the_last_is_ignored() -> None:
-    stream = OdometryStream("/odom")
+    stream = OdometryStream("/odom", ODOMETRY)
     straight(stream, 1.0, 2.0, 1.5)
 
     assert stream.pose_at(2 * S) == pytest.approx([2.0, 0.0, 0.0])
 
 
 def test_what_is_missing_or_late_or_no_number_is_named() -> None:
-    stream = OdometryStream("/odom")
-    with pytest.raises(UsageError, match=r"nothing has come on /odom .*--no-odometry"):
+    stream = OdometryStream("/odom", ODOMETRY)
+    with pytest.raises(UsageError, match=r"nothing of the .* has come on /odom .*--no-odometry"):
         stream.until(S)
     with pytest.raises(UsageError, match="numbers that are not finite"):
         stream.on_pose(S, np.array([np.nan, 0.0, 0.0]), AHEAD)
