@@ -14,6 +14,7 @@ from cogmap.data.bags.mount import STATIC, TRANSFORMS, steps_of
 from cogmap.data.bags.odometry import pose_of, speeds_of
 from cogmap.data.bags.order import stamp_ns_of
 from cogmap.data.bags.topics import CAMERA_INFO, LASER_SCAN
+from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats
 from cogmap.recording.exporting.ros_drive import FRAMES, Frames
 from cogmap.ros2.cameras import SIDES, StereoStream
@@ -95,6 +96,15 @@ class Senses:
             ]
         return wanted
 
+    def _stamp_ns(self, message: Any, wall_ns: int) -> int:
+        """Return when a message was measured. Raises UsageError if it does not say so."""
+        robot_ns = stamp_ns_of(message)
+        if not robot_ns:
+            raise UsageError(
+                f"a {message.__msgtype__} has no stamp: have its driver set header.stamp"
+            )
+        return self.stamps.of(robot_ns, wall_ns)
+
     def pose_in_odometry(self, stamp_ns: int) -> Floats:
         """Return the pose (3,) of the robot in the frame of its odometry, at a time of the run."""
         if self.odometry is None or not self._has_frame:
@@ -133,7 +143,7 @@ class Senses:
 
     def _on_odometry(self, message: Any, wall_ns: int) -> list[Message]:
         assert self.odometry is not None
-        stamp_ns = self.stamps.of(stamp_ns_of(message), wall_ns)
+        stamp_ns = self._stamp_ns(message, wall_ns)
         pose = np.array(pose_of(message.pose.pose))
         self.odometry.on_pose(stamp_ns, pose, np.array(speeds_of(message.twist.twist)))
         odometry = message.header.frame_id.removeprefix("/") or FRAMES.odometry
@@ -145,14 +155,14 @@ class Senses:
     def _on_joints(self, message: Any, wall_ns: int) -> list[Message]:
         assert self.odometry is not None
         assert self._encoders is not None
-        stamp_ns = self.stamps.of(stamp_ns_of(message), wall_ns)
+        stamp_ns = self._stamp_ns(message, wall_ns)
         rolled = self._encoders.on_joints(stamp_ns, message)
         if rolled is not None:
             self.odometry.on_pose(stamp_ns, *rolled)
         return []
 
     def _on_image(self, side: int, message: Any, wall_ns: int) -> list[Message]:
-        stamp_ns = self.stamps.of(stamp_ns_of(message), wall_ns)
+        stamp_ns = self._stamp_ns(message, wall_ns)
         pair = self._cameras.on_image(side, stamp_ns, message)
         if pair is None:
             return []
@@ -165,7 +175,7 @@ class Senses:
 
     def _on_scan(self, message: Any, wall_ns: int) -> list[Message]:
         assert self.odometry is not None
-        stamp_ns = self.stamps.of(stamp_ns_of(message), wall_ns)
+        stamp_ns = self._stamp_ns(message, wall_ns)
         if not self._scans.is_due(stamp_ns):
             return []
 

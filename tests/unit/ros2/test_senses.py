@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap_ros2._dynamic import serialize_dynamic
+from rosbags.typesys import Stores, get_typestore
 
 from benchmarks.ros2 import robot
 from benchmarks.ros2.peer import Fields
@@ -25,6 +27,7 @@ SIZE = (48, 64)
 LEFT, RIGHT, LEFT_INFO, RIGHT_INFO = "/l/image", "/r/image", "/l/camera_info", "/r/camera_info"
 CAMERAS = Chosen((LEFT, RIGHT), (LEFT_INFO, RIGHT_INFO), "/odom")
 TYPES = Types("jazzy")
+STORE = get_typestore(Stores.ROS2_JAZZY)
 MESSAGES = TYPES.messages
 
 
@@ -58,21 +61,10 @@ class Robot:
 
 
 def made(kind: str, fields: Fields) -> Any:
-    """A message of a type, by the names of its fields."""
-    types = TYPES._store.types
-    _, definitions = TYPES._store.fielddefs[kind]
-    values: dict[str, Any] = {}
-    for name, (node, inner) in definitions:
-        value = fields[name]
-        if isinstance(value, dict):
-            value = made(inner, value)
-        elif isinstance(value, list):
-            value = np.array(value, np.float64)
-        elif isinstance(value, bytes):
-            value = np.frombuffer(value, np.uint8)
-        values[name] = value
-        del node
-    return types[kind](**values)
+    """A message of a type, by the names of its fields, as another library writes it."""
+    definition, _ = STORE.generate_msgdef(kind, ros_version=2)
+    content = serialize_dynamic(kind, definition)[kind](fields)
+    return TYPES.decoded(content, kind)
 
 
 def test_a_pair_becomes_a_frame_after_the_motion_that_led_to_it() -> None:
@@ -203,6 +195,12 @@ def laser(stamp_ns: int) -> Any:
             "intensities": [],
         },
     )
+
+
+def test_a_message_without_a_stamp_is_named() -> None:
+    sensed = Robot()
+    with pytest.raises(UsageError, match="nav_msgs/msg/Odometry has no stamp"):
+        sensed.send("/odom", made(ODOMETRY, robot.wheels(0, 0.0)))
 
 
 def test_reasons_are_said_once_however_their_numbers_differ_and_all_are_counted() -> None:
