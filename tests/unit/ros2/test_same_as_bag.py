@@ -24,7 +24,6 @@ from cogmap.services.player import formats
 from cogmap.services.player.config import Config
 from tests.support.reference import REFERENCE
 
-
 UNCALIBRATED = 1
 """Views before the calibration of the right camera, which the bag has after its first image."""
 
