@@ -121,7 +121,11 @@ def _wheels(
 @click.option("--right-topic", default="", help="The same of the right camera.")
 @click.option("--odometry-topic", default="", help="Odometry.  [default: the only one]")
 @click.option("--scan-topic", default="", help="Scans of a laser, where there are no cameras.")
-@click.option("--no-odometry", is_flag=True, help="Use none: views tell the motion.")
+@click.option(
+    "--no-odometry",
+    is_flag=True,
+    help="Use none: start with `cogmap run --set sensory.self_motion=views`.",
+)
 @click.option(
     "--wheel-joints",
     callback=_joints,
@@ -151,9 +155,9 @@ def _wheels(
     "--rate",
     "rate_hz",
     type=FiniteRange(0.1, 100),
-    default=10.0,
+    default=5.0,
     show_default=True,
-    help="Most views a second.",
+    help="Most views a second; the town's robot has five.",
 )
 @click.option(
     "--max-speed",

@@ -93,6 +93,13 @@ def integrate(start: Floats, steps: Floats) -> Floats:
     return np.column_stack([positions_m, headings_rad])
 
 
+def arc(length_m: float, turned_rad: float) -> Floats:
+    """Return where an arc of a circle leads to, (3,), that begins at the origin along x."""
+    chord_m = length_m * np.sinc(turned_rad / (2 * np.pi))
+    middle_rad = turned_rad / 2
+    return np.array([chord_m * np.cos(middle_rad), chord_m * np.sin(middle_rad), turned_rad])
+
+
 def moved_by(pose: Floats, motions: Floats) -> Floats:
     """Return the pose (3,) that a self-motion leads to from `pose`. The motion has (n, 3 or more)
     rows that begin with speed in m/s, turn rate in rad/s and duration in s.

@@ -214,17 +214,19 @@ class Bridge:
     def _drive(self) -> None:
         """Ask the robot for the speeds of the last command."""
         speeds = None if self._steering is None else self._steering.speeds
-        if speeds is None:
+        if speeds is None or self.senses is None:
             return
 
         self._said_ns = time.monotonic_ns()
+        stamps = self.senses.stamps
+        robot_ns = stamps.on_robot(stamps.now_ns(self._said_ns))
         ros = self._node.types.messages
         for kind, driver in self._drivers.items():
             if kind == TWIST:
                 driver.put(ros.twist(*speeds))
             else:
-                frame = self.senses.frames.robot if self.senses else ros_drive.FRAMES.robot
-                driver.put(ros.stamped_twist(ros.header(time.time_ns(), frame), *speeds))
+                header = ros.header(robot_ns, self.senses.frames.robot)
+                driver.put(ros.stamped_twist(header, *speeds))
 
 
 class Saying:

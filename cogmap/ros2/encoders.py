@@ -8,7 +8,7 @@ import numpy as np
 
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import compose
+from cogmap.geometry.se2 import arc, compose
 
 JOINT_STATE = "sensor_msgs/msg/JointState"
 
@@ -57,10 +57,7 @@ class Encoders:
         left_m, right_m = (rolled_m - last_m).tolist()
         ahead_m = (left_m + right_m) / 2
         turned_rad = (right_m - left_m) / self._joints.track_m
-        chord_m = ahead_m * np.sinc(turned_rad / (2 * np.pi))
-        half_rad = turned_rad / 2
-        step = np.array([chord_m * np.cos(half_rad), chord_m * np.sin(half_rad), turned_rad])
-        self._pose = compose(self._pose, step)
+        self._pose = compose(self._pose, arc(ahead_m, turned_rad))
         passed_s = (stamp_ns - last_ns) / 1e9
         speeds = np.array([ahead_m, turned_rad]) / passed_s if passed_s else np.zeros(2)
         return self._pose, speeds

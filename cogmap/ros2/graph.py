@@ -12,6 +12,7 @@ from cogmap.data.bags.topics import (
     odometry_of,
     pair_of_topics,
     scans_of,
+    set_pair,
 )
 from cogmap.errors import UsageError
 from cogmap.ros2.rmw.keys import End, Seen
@@ -50,7 +51,8 @@ class RosGraph:
 
     def first(self, topic: str) -> Any:
         """Raise UsageError: nothing is received before topics are chosen by their names."""
-        raise self.wrong("has no two topics of images that differ in left and right", _BOTH)
+        what = "has no two topics of images that differ in left and right"
+        raise self.wrong(what, set_pair(self))
 
     def setting(self, name: str) -> str:
         """Return the option by which a user gives a topic, such as that of the `left` images."""
@@ -63,9 +65,6 @@ class RosGraph:
 
     def _of(self, end: End) -> list[Seen]:
         return [each for each in self._ends.values() if each.end is end]
-
-
-_BOTH = "name the images by --left-topic TOPIC --right-topic TOPIC"
 
 
 class Chosen(NamedTuple):

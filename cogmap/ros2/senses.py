@@ -27,7 +27,7 @@ from cogmap.ros2.wheels import OdometryStream
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Playback
 
-NUMBER = re.compile(r"\d+")
+NUMBER = re.compile(r"\b\d[\d.]*\b")
 """What differs between reasons of one kind."""
 
 Receive = Callable[[Any, int], list[Message]]
@@ -96,15 +96,6 @@ class Senses:
             ]
         return wanted
 
-    def _stamp_ns(self, message: Any, wall_ns: int) -> int:
-        """Return when a message was measured. Raises UsageError if it does not say so."""
-        robot_ns = stamp_ns_of(message)
-        if not robot_ns:
-            raise UsageError(
-                f"a {message.__msgtype__} has no stamp: have its driver set header.stamp"
-            )
-        return self.stamps.of(robot_ns, wall_ns)
-
     def pose_in_odometry(self, stamp_ns: int) -> Floats:
         """Return the pose (3,) of the robot in the frame of its odometry, at a time of the run."""
         if self.odometry is None or not self._has_frame:
@@ -131,6 +122,15 @@ class Senses:
         if is_first:
             self._reasons.append(reason)
         return is_first
+
+    def _stamp_ns(self, message: Any, wall_ns: int) -> int:
+        """Return when a message was measured. Raises UsageError if it does not say so."""
+        robot_ns = stamp_ns_of(message)
+        if not robot_ns:
+            raise UsageError(
+                f"a {message.__msgtype__} has no stamp: have its driver set header.stamp"
+            )
+        return self.stamps.of(robot_ns, wall_ns)
 
     def _on_transforms(self, message: Any, wall_ns: int) -> list[Message]:
         self._transforms.update(steps_of(message))

@@ -121,8 +121,8 @@ class OdometryStream:
         behind_ns = view_ns - self._samples[-1].stamp_ns
         if behind_ns > STALE_NS:
             raise UsageError(
-                f"an image is {behind_ns / 1e9:.1f} s newer than what came last on {self._topic}: "
-                "publish odometry as often as images, and stamp both by one clock"
+                f"a view is {behind_ns / 1e9:.1f} s newer than what came last on {self._topic}: "
+                "publish odometry as often, and stamp both by one clock"
             )
 
     def _last_before(self, stamp_ns: int) -> _Sample:

@@ -49,6 +49,7 @@ class Recorded:
     def __init__(self, peer: Peer, folder: Path) -> None:
         self.pictures = read_kitti(folder)
         self.twists: list[float] = []
+        self.stamped: list[Any] = []
         self._peer = peer
         self._ended = threading.Event()
         self._publishers = {
@@ -62,6 +63,7 @@ class Recorded:
             )
         }
         peer.subscribe("/cmd_vel", TWIST, lambda twist, _: self.twists.append(twist.linear.x))
+        peer.subscribe("/cmd_vel", f"{TWIST}Stamped", lambda twist, _: self.stamped.append(twist))
         self._thread = threading.Thread(target=self._drive)
 
     def __enter__(self) -> Recorded:
@@ -117,6 +119,10 @@ def test_a_robot_is_seen_through_driven_and_stopped(endpoint: str, tmp_path: Pat
         wait_until(lambda: recorded.twists[-1] > 0.0, "it drives on")
         assert bridge.end(signal.SIGINT) == 0
         assert recorded.twists[-1] == 0.0
+
+        stamped = recorded.stamped[-1]
+        assert (stamped.twist.linear.x, stamped.header.frame_id) == (0.0, "base_link")
+        assert stamped.header.stamp.sec == pytest.approx(time.time(), abs=10)
 
         left, right = recorded.pictures.pair(0)
         np.testing.assert_array_equal(views[0].left.numpy(), left)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.se2 import compose, relative
+from cogmap.geometry.se2 import arc, compose, relative
 from cogmap.recording.exporting.moments import (
     OBJECT_HEIGHT_M,
     OBJECT_WIDTH_M,
@@ -246,6 +246,4 @@ class RosDrive:
 
 def arc_of(moved: Odometry) -> Floats:
     """Return where a motion leads to, (3,), if both of its speeds are even."""
-    half_rad = moved.turn_rate_rad_s * moved.dt_s / 2
-    chord_m = moved.speed_m_s * moved.dt_s * np.sinc(half_rad / np.pi)
-    return np.array([chord_m * np.cos(half_rad), chord_m * np.sin(half_rad), 2 * half_rad])
+    return arc(moved.speed_m_s * moved.dt_s, moved.turn_rate_rad_s * moved.dt_s)

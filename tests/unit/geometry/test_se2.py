@@ -34,6 +34,11 @@ def test_composing_with_a_relative_pose_leads_back_to_the_pose() -> None:
     assert se2.compose(POSES, steps) == pytest.approx(STEPS)
 
 
+def test_a_quarter_of_a_circle_leads_to_its_radius_ahead_and_aside() -> None:
+    assert se2.arc(np.pi, np.pi / 2) == pytest.approx([2.0, 2.0, np.pi / 2])
+    assert se2.arc(3.0, 0.0).tolist() == [3.0, 0.0, 0.0]
+
+
 def test_one_pose_transforms_many_points_as_each_alone() -> None:
     together = se2.transform_from(POSES[0], POINTS)
     alone = [se2.transform_from(POSES[0], point) for point in POINTS]

@@ -101,5 +101,5 @@ def test_what_is_missing_or_late_or_no_number_is_named() -> None:
         stream.on_pose(S, np.array([np.nan, 0.0, 0.0]), AHEAD)
 
     straight(stream, 1.0)
-    with pytest.raises(UsageError, match=r"an image is 0\.8 s newer .* stamp both by one clock"):
+    with pytest.raises(UsageError, match=r"a view is 0\.8 s newer .* stamp both by one clock"):
         stream.until(round(1.8 * S))
