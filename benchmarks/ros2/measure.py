@@ -94,13 +94,20 @@ def measure(setting: Setting) -> Metrics:
     finally:
         router.close()  # type: ignore[no-untyped-call]
 
+    return metrics_of(mind, driven[0])
+
+
+def metrics_of(mind: Mind, driven: Driven) -> Metrics:
+    """Return the metrics of VIEWS views after the UNCOUNTED first ones, and of the commands that
+    answer them.
+    """
     first = min(mind.views_ns) + UNCOUNTED
     last = max(number for number in mind.frames if number < first + VIEWS)
     first = min(number for number in mind.frames if number >= first)
     passed = mind.frames[last] - mind.frames[first]
     counted = range(first, last + 1)
-    views_ms = _waits_ms(driven[0].views_ns, mind.views_ns, counted)
-    commands_ms = _waits_ms(mind.commands_ns, driven[0].commands_ns, counted)
+    views_ms = _waits_ms(driven.views_ns, mind.views_ns, counted)
+    commands_ms = _waits_ms(mind.commands_ns, driven.commands_ns, counted)
     view_p99, command_p99 = (float(np.percentile(each, 99)) for each in (views_ms, commands_ms))
     return {
         "latency_ms_p99": max(view_p99, command_p99),
