@@ -25,6 +25,7 @@ from cogmap.cli.run.options import AROUND_S, LAP_LIMIT_S
 from cogmap.errors import StorageError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
+from cogmap.services import registry
 from cogmap.services.sim.layout.towns import BLOCKS, LOOP, OSM
 
 
@@ -124,6 +125,8 @@ def _introduce(screen: Display, drive: Drive) -> None:
         modules = ", ".join(drive.choices.without)
         options = f"--connect {drive.endpoint} --config {drive.folder / CONFIG_NAME}"
         screen.show(f"start {modules} yourself with {options}")
+    if registry.SIM in drive.choices.without:
+        screen.show(f"or let a robot be sim: cogmap ros2 --connect {drive.endpoint}")
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cogmap.data.bags.mount import mount_by
-from cogmap.data.bags.odometry import NS_PER_S
+from cogmap.data.bags.order import NS_PER_S
 from cogmap.data.bags.scans import rays_of
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message

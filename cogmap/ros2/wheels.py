@@ -7,7 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.bags.odometry import NS_PER_S, Poses
+from cogmap.data.bags.odometry import Poses
+from cogmap.data.bags.order import NS_PER_S
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import compose, moved_by

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from cogmap.data.bags.bag import Bag
-from cogmap.data.bags.odometry import NS_PER_S, Motions
+from cogmap.data.bags.odometry import Motions
+from cogmap.data.bags.order import NS_PER_S
 from cogmap.data.bags.pairs import read_pairs
 from cogmap.data.bags.scans import ScanRecording, read_scans
 from cogmap.data.bags.topics import LASER_SCAN, Topics, has_pair

@@ -8,7 +8,8 @@ from functools import cached_property
 from operator import attrgetter
 from pathlib import Path
 
-from cogmap.data.bags.odometry import NS_PER_S, Motions
+from cogmap.data.bags.odometry import Motions
+from cogmap.data.bags.order import NS_PER_S
 from cogmap.data.euroc import read_euroc
 from cogmap.data.image_folder import read_images
 from cogmap.data.kitti import read_kitti

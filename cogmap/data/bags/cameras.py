@@ -20,7 +20,7 @@ MODELS = ("", "plumb_bob", "rational_polynomial")
 NUMBERS = 5
 """How many numbers of a distortion our calibration has."""
 
-CALIBRATE = "calibrate both cameras together, as camera_calibration does, and record it again"
+CALIBRATE = "calibrate both cameras together, as camera_calibration does"
 NOWHERE = np.eye(4)
 
 RECTIFIED = "image_rect"
@@ -72,7 +72,7 @@ def check_size(image: Bytes, calibration: Calibration, name: str) -> None:
     if image.shape[:2] != size:
         raise UsageError(
             f"{name} is {image.shape[1]} x {image.shape[0]}, its CameraInfo says {size[1]} x "
-            f"{size[0]}: record the calibration of these images"
+            f"{size[0]}: give the calibration of these images"
         )
 
 

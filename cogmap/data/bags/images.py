@@ -10,7 +10,7 @@ import numpy as np
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Bytes
 
-REMEDY = "record it again, or cut this part of the bag off"
+REMEDY = "send or record it again, or cut this part of the bag off"
 
 
 class Encoding(NamedTuple):
@@ -65,7 +65,7 @@ def _raw(message: Any, name: str) -> Any:
     encoding = ENCODINGS.get(message.encoding)
     if encoding is None:
         raise UsageError(
-            f"{name} has the encoding {message.encoding!r}: record it as one of "
+            f"{name} has the encoding {message.encoding!r}: give it as one of "
             f"{', '.join(ENCODINGS)}, or compressed"
         )
 

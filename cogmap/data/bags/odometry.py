@@ -8,11 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cogmap.data.bags.bag import Bag
-from cogmap.data.bags.order import in_order
+from cogmap.data.bags.order import NS_PER_S, in_order
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import wrap_angle
-
-NS_PER_S = 1_000_000_000
 
 LONGEST_NS = 10 * NS_PER_S
 """A longer motion is divided: no message of odometry lasts longer."""

@@ -193,7 +193,7 @@ def _two_pairs(maker: BagMaker) -> None:
         (_one_camera, r"no pair of topics of images.* it has /stereo/left/camera_info \(sensor_ms"),
         (frames, "has no /stereo/left/camera_info"),
         (cameras, "no pair of topics of images, left and right.*--set player.left_topic=TOPIC"),
-        (_unknown_encoding, "has the encoding 'yuv422': record it as one of mono8"),
+        (_unknown_encoding, "has the encoding 'yuv422': give it as one of mono8"),
         (_of_other_images, "is 64 x 48, its CameraInfo says 640 x 480"),
         (_swapped, r"P\[3\] is 27\.5, by which it does not stand to the right"),
         (_fisheye, "the distortion model 'equidistant' is none of plumb_bob"),
