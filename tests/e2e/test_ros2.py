@@ -26,7 +26,8 @@ from cogmap.ros2.rmw.types import Types
 from cogmap.runtime.client import Client
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
-from cogmap.schemas.sensing import MotorCommand, StereoFrame
+from cogmap.schemas.sensing import MotorCommand, StereoFrame, View
+from cogmap.services import registry
 from tests.support.recordings import kitti_folder
 from tests.support.system.processes import Process, wait_until
 
@@ -128,6 +129,27 @@ def test_a_robot_is_seen_through_driven_and_stopped(endpoint: str, tmp_path: Pat
         np.testing.assert_array_equal(views[0].left.numpy(), left)
         np.testing.assert_array_equal(views[0].right.numpy(), right)
         assert views[0].calibration.baseline_m == pytest.approx(0.5)
+
+
+def test_what_a_robot_sees_becomes_a_view_with_depth(endpoint: str, tmp_path: Path) -> None:
+    folder = kitti_folder(tmp_path / "drive")
+    views: list[View] = []
+    bridge = Process("ros2", tmp_path / "ros2.txt", "ros2", "--connect", endpoint, "--watch-only")
+    sensory = registry.build("sensory", {"sensory": {"self_motion": "wheels"}})
+    observer = Module("observer").on(topics.VIEW, views.append)
+    with (
+        Peer(endpoint) as peer,
+        Recorded(peer, folder) as recorded,
+        Client(sensory, endpoint),
+        Client(observer, endpoint),
+    ):
+        wait_until(lambda: len(views) > 2, "views with depth arrive")
+        assert bridge.end(signal.SIGINT) == 0
+
+    depth_m = views[-1].depth_m.numpy()
+    wall_m = robot.FOCAL_PX * robot.BASELINE_M / 5  # the pictures are moved by five pixels
+    assert np.median(depth_m[depth_m > 0]) == pytest.approx(wall_m, rel=0.02)
+    assert recorded.twists == []
 
 
 def test_what_a_robot_lacks_is_said_with_what_it_has(endpoint: str, tmp_path: Path) -> None:

@@ -135,6 +135,9 @@ def _pairs(source: Source, given: Topics) -> list[tuple[str, str]]:
         return [(given.left, given.right)]
 
     images = source.of_kind(*IMAGES)
+    if not (given.left or given.right):
+        # What compresses another topic, as image_transport does, shows the same.
+        images = [name for name in images if name.rpartition("/")[0] not in images]
     pairs = [(left, _other_side(left)) for left in images]
     pairs = [(left, right) for left, right in pairs if right != left and right in images]
     pairs = pairs or _pairs_by_baseline(source, images)

@@ -35,6 +35,18 @@ def test_one_side_that_is_named_tells_the_other(path: Path) -> None:
     assert _chosen(path, Topics(right=RIGHT)) == raw
 
 
+def test_images_that_are_there_compressed_as_well_are_taken_as_they_are(tmp_path: Path) -> None:
+    compressed = (f"{LEFT}/compressed", f"{RIGHT}/compressed")
+    with BagMaker(tmp_path / "bag") as maker:
+        cameras(maker)
+        frames(maker, range(1))
+        for name in compressed:
+            maker.compressed(name, bags.frame_ns(0), bags.png(bags.WALL))
+
+    assert _chosen(tmp_path / "bag", Topics()) == (LEFT, RIGHT)
+    assert _chosen(tmp_path / "bag", Topics(left=compressed[0])) == compressed
+
+
 def test_two_topics_that_are_named_are_taken(path: Path) -> None:
     rectified = ("/stereo/left/image_rect", "/stereo/right/image_rect")
 
