@@ -28,8 +28,8 @@ it is none of its type.
 class RosNode:
     """A node in `domain`: publishes and subscribes by a session, which it closes at its end.
 
-    What arrives is decoded by who takes it; `dropped` counts what nobody took in time, and `gaps`
-    what did not arrive.
+    What arrives is decoded by who takes it; `gaps` counts what did not arrive, or was not taken
+    before newer messages.
     """
 
     def __init__(
