@@ -3,8 +3,9 @@ BIN := .venv/bin
 INSTALLED := .venv/installed
 TRAINS := .venv/trains
 MEASURES := .venv/measures
+RERUN := .venv/rerun
 
-.PHONY: help setup train-setup bench-setup demo test test-compose lint generated bench release clean
+.PHONY: help setup train-setup bench-setup rerun-setup demo test test-compose lint generated bench release clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -32,6 +33,12 @@ bench-setup: $(MEASURES) ## gtsam and scikit-learn besides, which benchmarks com
 
 $(MEASURES): $(INSTALLED) requirements/bench.txt
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/bench.txt
+	touch $@
+
+rerun-setup: $(RERUN) ## Rerun besides (500 MB), to test what is written for it
+
+$(RERUN): $(INSTALLED) requirements/rerun.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/rerun.txt
 	touch $@
 
 # A battery that lasts for a minute or two of driving, so that a need rises while one watches.

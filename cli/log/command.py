@@ -16,7 +16,7 @@ VERBS = {
     "perception": ("cogmap.cli.log.pictures:perception", "Draw what was perceived in a view."),
     "export": (
         "cogmap.cli.log.export:export",
-        "Write a log for other tools: tables, Foxglove, ROS.",
+        "Write a log for other tools: tables, Foxglove, Rerun, ROS.",
     ),
     "import": ("cogmap.cli.log.importing:import_bag", "Make a log of a bag of ROS."),
     "replay": ("cogmap.cli.log.replay:replay", "Play a log onto the bus, or into modules."),

@@ -13,6 +13,7 @@ from cogmap.cli.topic.argument import topics_argument
 from cogmap.errors import UsageError
 from cogmap.recording import selection
 from cogmap.recording.exporting.foxglove import write_foxglove
+from cogmap.recording.exporting.rerun import write_rerun
 from cogmap.recording.exporting.rosbag2 import write_rosbag2
 from cogmap.recording.exporting.tables import TableFormat, write_tables
 from cogmap.recording.log import open_log
@@ -22,6 +23,7 @@ Examples:
   cogmap log export runs/latest --csv tables               every topic but images
   cogmap log export drive.mcap --parquet tables odometry truth/pose
   cogmap log export runs/latest --foxglove drive.foxglove.mcap
+  cogmap log export runs/latest --rerun drive.rrd    then `rerun drive.rrd`
   cogmap log export runs/latest --rosbag2 bag    then `ros2 bag play bag`
 """
 
@@ -53,6 +55,14 @@ Examples:
     "FILE; TOPICS are of no matter.",
 )
 @click.option(
+    "--rerun",
+    "rerun_path",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write images, depth, poses, path, map, range scans and needs for Rerun into the new file "
+    "FILE; TOPICS are of no matter.",
+)
+@click.option(
     "--rosbag2",
     "bag_folder",
     type=click.Path(path_type=Path),
@@ -67,6 +77,7 @@ def export(
     csv_folder: Path | None,
     parquet_folder: Path | None,
     foxglove_path: Path | None,
+    rerun_path: Path | None,
     bag_folder: Path | None,
     as_json: bool,
 ) -> None:
@@ -77,7 +88,11 @@ def export(
     """
     folders = {TableFormat.CSV: csv_folder, TableFormat.PARQUET: parquet_folder}
     tables = [(kind, folder) for kind, folder in folders.items() if folder is not None]
-    for_viewers = {write_foxglove: foxglove_path, write_rosbag2: bag_folder}
+    for_viewers = {
+        write_foxglove: foxglove_path,
+        write_rerun: rerun_path,
+        write_rosbag2: bag_folder,
+    }
     drives = [(write, path) for write, path in for_viewers.items() if path is not None]
     if not tables and not drives:
         raise UsageError("name a format and where to write it, such as --csv DIR")

@@ -89,10 +89,11 @@ def test_the_library_requires_ranges_and_the_application_one_version_within_each
         assert pin.marker == ranges[name].marker, name
 
 
-def test_what_renders_trains_or_makes_tables_is_optional_for_the_library() -> None:
+def test_what_renders_trains_makes_tables_or_shows_is_optional() -> None:
     tables = _ranges("tables")
     (tested,) = _pins("dev")["pyarrow"].specifier
 
+    assert _ranges("rerun").keys() == _pins("rerun").keys()
     assert tables.keys() == {"pyarrow"}
     assert tested.version in tables["pyarrow"].specifier
     assert _ranges("rendering").keys() == {"pybullet"}
@@ -110,5 +111,5 @@ def test_the_notices_name_every_dependency_with_its_licence() -> None:
     rows = re.findall(r"^\| ([\w-]+) \| ([^|]+) \| [^|]+ \|$", notices, re.MULTILINE)
 
     named = {name: licence for name, licence in rows if name != "package"}
-    assert named.keys() == _pins("run", "train", "bench", "build", "dev").keys()
+    assert named.keys() == _pins("run", "train", "bench", "build", "dev", "rerun").keys()
     assert all(licence.strip() for licence in named.values())

@@ -13,6 +13,8 @@ from cogmap.recording.storage.writer import LogWriter
 from cogmap.schemas import topics
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
+from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.nodes import AnyNode
 from cogmap.schemas.sensing import RangeScan
 
 SECOND_NS = 10**9
@@ -41,4 +43,16 @@ def scan(seq: int, *, stamp_ns: int = 0, values: Array | None = None) -> RangeSc
         frame=seq,
         bearing_rad=values,
         range_m=values,
+    )
+
+
+def delta(version: int, *nodes: AnyNode) -> Delta:
+    """The commit of that number, which puts these nodes."""
+    return Delta(
+        seq=version,
+        source="workspace",
+        version=version,
+        cycle=version,
+        phase=Phase.END,
+        operations=list(nodes),
     )

@@ -27,14 +27,14 @@ from cogmap.recording.log import Log
 from cogmap.recording.storage.reader import Progress
 from cogmap.recording.views import camera_image, depth
 from cogmap.schemas import topics
-from cogmap.schemas.nodes import Object, Self
+from cogmap.schemas.nodes import Need, Object, Self
 from cogmap.schemas.sensing import RangeScan, TruePose, View
 
 MAP = "map"
 ROBOT = "robot"
 CAMERA = "camera"
 TOWN = "town"
-_SENSES = (topics.VIEW, topics.SCAN)
+SENSES = (topics.VIEW, topics.SCAN)
 
 
 def write_foxglove(log: Log, path: Path, progress: Progress | None = None) -> dict[str, int]:
@@ -42,11 +42,12 @@ def write_foxglove(log: Log, path: Path, progress: Progress | None = None) -> di
 
     `/camera` and `/depth` are images, `/camera/calibration` the camera, `/tf` where the robot and
     its camera are, `/pose` what the agent believes, `/path`, `/plan`, `/objects` and `/places` the
-    map, `/scan` the points of a range scan, `/log` what became conscious and what processes report,
-    `/truth` where the robot is, in a frame of its own. Raises UsageError if the file exists or the
-    library is not installed, and LogError if the log is damaged.
+    map, `/scan` the points of a range scan, `/needs` how strong each need is, `/log` what became
+    conscious and what processes report, `/truth` where the robot is, in a frame of its own. Raises
+    UsageError if the file exists or the library is not installed, and LogError if the log is
+    damaged.
     """
-    foxglove = _library()
+    foxglove = library()
     context = foxglove.Context()
     try:
         writer = foxglove.open_mcap(path, context=context)
@@ -54,14 +55,16 @@ def write_foxglove(log: Log, path: Path, progress: Progress | None = None) -> di
         raise UsageError(f"{path} exists already: name a new file") from None
 
     with writer:
-        drive = _Drive(foxglove, context)
-        for moment in moments(log, _SENSES, progress):
-            drive.take(moment)
-    return dict(drive.written)
+        channels = Channels(foxglove, context)
+        for moment in moments(log, SENSES, progress):
+            channels.take(moment)
+    return dict(channels.written)
 
 
-class _Drive:
-    """Turns the moments of a drive into messages of Foxglove, and writes them."""
+class Channels:
+    """Turns the moments of a drive into messages of Foxglove, and sends them to whatever is open in
+    `context`: a file, or a server.
+    """
 
     def __init__(self, foxglove: Any, context: Any) -> None:
         self.written: Counter[str] = Counter()
@@ -75,6 +78,7 @@ class _Drive:
             View: self._write_view,
             RangeScan: self._write_scan,
             Self: self._write_pose,
+            Need: self._write_need,
             Sentence: self._write_sentence,
             TruePose: self._write_true_pose,
             Map: self._write_map,
@@ -88,12 +92,18 @@ class _Drive:
         self._writers[type(moment.content)](stamp, moment.content)
 
     def _write(self, topic: str, message: Any) -> None:
+        """Send a message of Foxglove's, or a dictionary, which becomes JSON."""
         channel = self._channels.get(topic)
         if channel is None:
-            kind = getattr(self._library.channels, f"{type(message).__name__}Channel")
-            channel = self._channels[topic] = kind(topic, context=self._context)
+            channel = self._channels[topic] = self._opened(topic, type(message))
         channel.log(message, log_time=self._log_time_ns)
         self.written[topic] += 1
+
+    def _opened(self, topic: str, kind: type) -> Any:
+        if kind is dict:
+            return self._library.Channel(topic, context=self._context)
+        channel = getattr(self._library.channels, f"{kind.__name__}Channel")
+        return channel(topic, context=self._context)
 
     def _pose(self, x_m: float, y_m: float, heading_rad: float = 0.0, z_m: float = 0.0) -> Any:
         return self._messages.Pose(
@@ -195,6 +205,9 @@ class _Drive:
             ),
         )
 
+    def _write_need(self, _stamp: Any, need: Need) -> None:
+        self._write("/needs", {"need": need.label, "level": need.level})
+
     def _write_sentence(self, stamp: Any, said: Sentence) -> None:
         level = self._messages.LogLevel.Info
         line = self._messages.Log(timestamp=stamp, level=level, name=said.name, message=said.text)
@@ -276,7 +289,8 @@ class _Drive:
         )
 
 
-def _library() -> Any:
+def library() -> Any:
+    """Import Foxglove's library. Raises UsageError, with the remedy, if it is not installed."""
     try:
         import foxglove
         import foxglove.channels

@@ -1,4 +1,4 @@
-"""What of a drive other tools show: senses, poses, sentences and the map, in order of time."""
+"""What of a drive other tools show: senses, beliefs, sentences and the map, in order of time."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Broadcast
 from cogmap.schemas.graph import Delta
-from cogmap.schemas.nodes import PLAN_ID, ROOT_MAP, Object, PathColumn, PlaceColumn, Plan
+from cogmap.schemas.nodes import PLAN_ID, ROOT_MAP, Need, Object, PathColumn, PlaceColumn, Plan
 from cogmap.schemas.process import Health
 from cogmap.schemas.sensing import Odometry, RangeScan, SelfMotion
 from cogmap.schemas.topics import Topic
@@ -61,14 +61,16 @@ class Map:
 
 
 class Moment(NamedTuple):
-    """A message of a drive, a belief (Self), a Sentence or the Map, as it was at `stamp_ns`.
+    """A message of a drive, a Self, a Need, a Sentence or the Map, as it was at `stamp_ns`.
 
-    The stamp is on the log's clock, as if drive and log had begun at once; `log_time_ns` is when
-    the log received it.
+    The stamp is on the clock of who received it, as if its first message had taken no time;
+    `log_time_ns` is when it was received, `time_s` the same in seconds since the log's first
+    message.
     """
 
     stamp_ns: int
     log_time_ns: int
+    time_s: float
     content: Any
 
 
@@ -78,7 +80,8 @@ def moments(
     """Yield what there is to show of the drive in `log`: the messages of `senses`, and what the
     agent believed, said and knew. Raises LogError if the log is damaged.
     """
-    drive = _Drive()
+    graph = Graph()
+    drive = Drive(graph, lambda delta, _: graph.apply(delta))
     for entry in log.messages(*senses, *OF_MIND):
         yield from drive.shown(entry)
         if progress is not None:
@@ -86,14 +89,19 @@ def moments(
     yield from drive.end()
 
 
-class _Drive:
-    """Follows a drive, message by message."""
+class Drive:
+    """Follows a drive, message by message, from a log or as it happens.
 
-    def __init__(self) -> None:
-        self._graph = Graph()
+    `graph` is its workspace's, which `follow` keeps: it takes a delta and the incarnation that
+    published it.
+    """
+
+    def __init__(self, graph: Graph, follow: Callable[[Delta, int | None], object]) -> None:
+        self._graph = graph
+        self._follow = follow
         self._map_due_s = 0.0
         self._begin_ns: int | None = None
-        self._log_time_ns = 0
+        self._entry: Entry
         self._stamp_ns = 0
         self._readers: dict[type[Message], Callable[[Any], Iterator[Moment]]] = {
             Delta: self._of_delta,
@@ -104,9 +112,9 @@ class _Drive:
 
     def shown(self, entry: Entry) -> Iterator[Moment]:
         """Yield what follows from a message."""
-        if self._begin_ns is None:
-            self._begin_ns = entry.log_time_ns
-        self._log_time_ns = entry.log_time_ns
+        self._entry = entry
+        if self._begin_ns is None and not isinstance(entry.message, Health):
+            self._begin_ns = entry.log_time_ns - entry.message.stamp_ns
         reader = self._readers.get(type(entry.message))
         yield from self._of_sense(entry.message) if reader is None else reader(entry.message)
 
@@ -122,8 +130,9 @@ class _Drive:
 
     def _moment(self, stamp_ns: int, content: Any) -> Moment:
         self._stamp_ns = max(stamp_ns, 0)
-        begin_ns = self._begin_ns or 0
-        return Moment(begin_ns + self._stamp_ns, self._log_time_ns, content)
+        received = self._entry
+        begin_ns = received.log_time_ns if self._begin_ns is None else self._begin_ns
+        return Moment(begin_ns + self._stamp_ns, received.log_time_ns, received.time_s, content)
 
     def _of_sense(self, message: Message) -> Iterator[Moment]:
         yield self._moment(message.stamp_ns, message)
@@ -144,10 +153,15 @@ class _Drive:
 
     def _of_delta(self, delta: Delta) -> Iterator[Moment]:
         before = self._graph.agent
-        self._graph.apply(delta)
+        envelope = self._entry.envelope
+        self._follow(delta, None if envelope is None else envelope.incarnation)
         agent = self._graph.agent
         if agent is not None and agent is not before:
             yield self._moment(agent.stamp_ns, agent)
+
+        for changed in delta.operations:
+            if isinstance(changed, Need):
+                yield self._moment(delta.stamp_ns, changed)
 
     def _of_broadcast(self, broadcast: Broadcast) -> Iterator[Moment]:
         coalition = broadcast.coalition

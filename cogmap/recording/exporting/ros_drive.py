@@ -27,7 +27,7 @@ from cogmap.recording.exporting.ros_messages import (
 from cogmap.recording.views import depth
 from cogmap.robot import TRACK_M, WHEEL_RADIUS_M
 from cogmap.schemas.array import Array
-from cogmap.schemas.nodes import Object, PlaceColumn, Self
+from cogmap.schemas.nodes import Need, Object, PlaceColumn, Self
 from cogmap.schemas.sensing import (
     MotorCommand,
     Odometry,
@@ -97,6 +97,7 @@ class RosDrive:
             Odometry: self._motion,
             MotorCommand: self._command,
             Self: self._pose,
+            Need: self._need,
             Sentence: self._sentence,
             TruePose: self._true_pose,
             Map: self._map,
@@ -202,6 +203,9 @@ class RosDrive:
             self.frames.map, self.frames.odometry, place_m, turned(heading_rad)
         )
         yield self._transforms(TRANSFORMS, placed)
+
+    def _need(self, need: Need) -> Iterator[Shown]:
+        yield f"/needs/{need.label}", self._ros.make("std_msgs/msg/Float64", need.level)
 
     def _sentence(self, said: Sentence) -> Iterator[Shown]:
         yield "/rosout", self._ros.line(self._stamp_ns, said.name, said.text)

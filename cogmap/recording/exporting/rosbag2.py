@@ -27,9 +27,10 @@ def write_rosbag2(log: Log, folder: Path, progress: Progress | None = None) -> d
     `/camera/left`, `/camera/right` and `/camera/depth` are images, each with its `camera_info`,
     `/odom` the self-motion, `/scan` the points of a range scan, `/cmd_vel` the motor commands;
     `/pose` is what the agent believes, `/path`, `/plan`, `/objects` and `/map` what it has mapped,
-    `/tf` and `/tf_static` the frames, `/rosout` what became conscious and what processes report,
-    `/truth` where the robot is, in a frame of its own. Raises UsageError if the folder exists or
-    the library is not installed, and LogError if the log is damaged.
+    `/tf` and `/tf_static` the frames, `/needs/NAME` how strong a need is, `/rosout` what became
+    conscious and what processes report, `/truth` where the robot is, in a frame of its own. Raises
+    UsageError if the folder exists or the library is not installed, and LogError if the log is
+    damaged.
     """
     rosbag2, store = _library()
     mcap = rosbag2.StoragePlugin.MCAP

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import sys
 from collections import defaultdict
@@ -19,8 +20,9 @@ from cogmap.graph.graph import Graph
 from cogmap.recording import open_log
 from cogmap.recording.exporting.foxglove import write_foxglove
 from cogmap.schemas import topics
-from cogmap.schemas.nodes import ROOT_MAP, Object
+from cogmap.schemas.nodes import ROOT_MAP, Need, Object
 from cogmap.schemas.sensing import View
+from tests.support.logs import SECOND_NS, delta, write_log
 from tests.support.reference import REFERENCE
 
 
@@ -124,3 +126,14 @@ def test_without_the_library_the_remedy_is_named(
 
     with pytest.raises(UsageError, match=r"cogmap\[foxglove\]"):
         write_foxglove(open_log(REFERENCE), tmp_path / "drive.mcap")
+
+
+def test_needs_are_json(tmp_path: Path) -> None:
+    need = Need(id="need:energy", label="energy", level=0.25)
+    log = write_log(tmp_path / "log.mcap", [(SECOND_NS, delta(1, need))])
+    write_foxglove(open_log(log), tmp_path / "drive.mcap")
+
+    with (tmp_path / "drive.mcap").open("rb") as file:
+        ((_, channel, message),) = make_reader(file).iter_messages()
+    assert (channel.topic, channel.message_encoding) == ("/needs", "json")
+    assert json.loads(message.data) == {"need": "energy", "level": 0.25}

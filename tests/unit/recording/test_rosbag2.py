@@ -20,10 +20,10 @@ from cogmap.graph.graph import Graph
 from cogmap.recording import open_log
 from cogmap.recording.exporting.rosbag2 import write_rosbag2
 from cogmap.schemas import topics
-from cogmap.schemas.nodes import ROOT_MAP, Object
+from cogmap.schemas.nodes import ROOT_MAP, Need, Object
 from cogmap.schemas.sensing import Odometry, StereoFrame, View
 from cogmap.testing import self_motion
-from tests.support.logs import write_log
+from tests.support.logs import SECOND_NS, delta, write_log
 from tests.support.reference import REFERENCE
 
 Messages = dict[str, list[Any]]
@@ -186,3 +186,11 @@ def test_without_the_library_the_remedy_is_named(
 
     with pytest.raises(UsageError, match=r"cogmap\[bags\]"):
         write_rosbag2(open_log(REFERENCE), tmp_path / "bag")
+
+
+def test_needs_are_numbers(tmp_path: Path) -> None:
+    need = Need(id="need:energy", label="energy", level=0.25)
+    log = write_log(tmp_path / "log.mcap", [(SECOND_NS, delta(1, need))])
+    write_rosbag2(open_log(log), tmp_path / "bag")
+
+    assert [each.data for each in _read(tmp_path / "bag")["/needs/energy"]] == [0.25]
