@@ -53,6 +53,7 @@ VERBS = {
     "time": ("cogmap.cli.pausing:time_", "Let simulated time stand, go on by views, and pass."),
     "topic": ("cogmap.cli.topic.command:topic", "Watch topics of a running system; publish."),
     "train": ("cogmap.training.command:train", "Train the networks of perception."),
+    "view": ("cogmap.cli.view.command:view", "Show a running system in Foxglove or Rerun."),
 }
 
 

@@ -35,6 +35,13 @@ ROBOT = "robot"
 CAMERA = "camera"
 TOWN = "town"
 SENSES = (topics.VIEW, topics.SCAN)
+NEEDS = "/needs"
+NEED_SCHEMA = {
+    "title": "Need",
+    "type": "object",
+    "properties": {"need": {"type": "string"}, "level": {"type": "number"}},
+}
+"""Foxglove itself has no type for a number that is to be plotted."""
 
 
 def write_foxglove(log: Log, path: Path, progress: Progress | None = None) -> dict[str, int]:
@@ -69,7 +76,8 @@ class Channels:
     def __init__(self, foxglove: Any, context: Any) -> None:
         self.written: Counter[str] = Counter()
         self._messages = foxglove.messages
-        self._channels: dict[str, Any] = {}
+        needs = foxglove.Channel(NEEDS, schema=NEED_SCHEMA, context=context)
+        self._channels: dict[str, Any] = {NEEDS: needs}
         self._context = context
         self._library = foxglove
         self._log_time_ns = 0
@@ -92,18 +100,12 @@ class Channels:
         self._writers[type(moment.content)](stamp, moment.content)
 
     def _write(self, topic: str, message: Any) -> None:
-        """Send a message of Foxglove's, or a dictionary, which becomes JSON."""
         channel = self._channels.get(topic)
         if channel is None:
-            channel = self._channels[topic] = self._opened(topic, type(message))
+            kind = getattr(self._library.channels, f"{type(message).__name__}Channel")
+            channel = self._channels[topic] = kind(topic, context=self._context)
         channel.log(message, log_time=self._log_time_ns)
         self.written[topic] += 1
-
-    def _opened(self, topic: str, kind: type) -> Any:
-        if kind is dict:
-            return self._library.Channel(topic, context=self._context)
-        channel = getattr(self._library.channels, f"{kind.__name__}Channel")
-        return channel(topic, context=self._context)
 
     def _pose(self, x_m: float, y_m: float, heading_rad: float = 0.0, z_m: float = 0.0) -> Any:
         return self._messages.Pose(
@@ -206,7 +208,7 @@ class Channels:
         )
 
     def _write_need(self, _stamp: Any, need: Need) -> None:
-        self._write("/needs", {"need": need.label, "level": need.level})
+        self._write(NEEDS, {"need": need.label, "level": need.level})
 
     def _write_sentence(self, stamp: Any, said: Sentence) -> None:
         level = self._messages.LogLevel.Info

@@ -15,6 +15,7 @@ from cogmap.cli.main import VERBS, cogmap
 from cogmap.cli.memory.command import memory
 from cogmap.cli.topic.command import topic
 from cogmap.cli.verbs import LazyCommand
+from cogmap.cli.view.command import view
 from cogmap.recording.storage.format import SOFTWARE
 
 ALIASES = {"bag": "log"}
@@ -44,7 +45,7 @@ def test_help_lists_every_command_and_imports_none_of_them() -> None:
 
 ROWS = [
     pytest.param(command, id=f"{group.name} {command.name}")
-    for group in (cogmap, experiment, log, memory, topic)
+    for group in (cogmap, experiment, log, memory, topic, view)
     for command in group.commands.values()
 ]
 
