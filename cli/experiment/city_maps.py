@@ -97,7 +97,8 @@ def city_maps(
     have the measured errors of perception.
     """
     out = results.folder_for(NAME, common.out)
-    places = _places(osm, all_in, maps, common.seed)
+    with bar("choosing buildings"):
+        places = _places(osm, all_in, maps, common.seed)
     chosen = Noise(speed=noise[0], turn=noise[1], drift_rad_per_sqrt_m=noise[2])
 
     if fit:

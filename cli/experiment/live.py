@@ -13,6 +13,7 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.launch.command_line import cogmap_command
 from cogmap.cli.launch.plan import CONFIG_NAME, ROUTER, to_toml
 from cogmap.cli.launch.supervisor import Program, Supervisor
+from cogmap.cli.progress import bar
 from cogmap.errors import CogmapError
 from cogmap.experiments import transcript
 from cogmap.experiments.transcript import Transcript
@@ -41,7 +42,8 @@ def differing(sections: Sections, modules: Sequence[str]) -> list[str]:
 
     built = [registry.build(name, sections) for name in modules]
     runner = InProcessRunner([*built, inside.module()])
-    runner.run()
+    with bar("in one process"):
+        runner.run()
     runner.close()
 
     instances = [(name, name) for name in modules]
@@ -87,6 +89,7 @@ def run(
             stack.callback(shell.close)
             shell.open()
 
+        stack.enter_context(bar("through real processes"))
         until_s = time.monotonic() + TIMEOUT_S
         while not is_done() and time.monotonic() < until_s:
             had_work = [shell.spin_once(SPIN_S) for shell in shells]

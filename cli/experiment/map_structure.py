@@ -13,6 +13,7 @@ from cogmap.data.osm import SUFFIXES
 from cogmap.errors import UsageError
 from cogmap.experiments.map_structure.city import StructuredCity, read_city
 from cogmap.experiments.map_structure.measure import measure, metrics_of
+from cogmap.parallel import Progress
 
 NAME = "map-structure"
 _EPILOG = """\b
@@ -46,7 +47,8 @@ def map_structure(common: Common, osm: Path | None, all_in: Path | None) -> None
     when positions err by 2 m; and the agreement with quarters, if an extract names them.
     """
     folder = results.folder_for(NAME, common.out)
-    cities = _cities(osm, all_in)
+    with bar("reading") as progress:
+        cities = _cities(osm, all_in, progress)
 
     with bar("structuring") as progress:
         found = measure(cities, common.seed, common.processes, progress)
@@ -59,7 +61,7 @@ def map_structure(common: Common, osm: Path | None, all_in: Path | None) -> None
     results.save(folder, NAME, figure(found), metrics, common)
 
 
-def _cities(osm: Path | None, all_in: Path | None) -> list[StructuredCity]:
+def _cities(osm: Path | None, all_in: Path | None, progress: Progress) -> list[StructuredCity]:
     if (osm is None) == (all_in is None):
         raise UsageError("give one of --osm FILE, --all DIR: there are no sub-maps without a city")
 
@@ -74,4 +76,8 @@ def _cities(osm: Path | None, all_in: Path | None) -> list[StructuredCity]:
     if not files:
         raise UsageError(f"{all_in} has no OpenStreetMap extracts ({SUFFIXES[0]}): put some there")
 
-    return [read_city(file) for file in files]
+    cities = []
+    for file in files:
+        cities.append(read_city(file))
+        progress(len(cities) / len(files))
+    return cities

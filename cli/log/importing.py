@@ -61,7 +61,8 @@ def import_bag(bag: Path, log: Path, settings: tuple[str, ...], as_json: bool) -
     named = f"bag:{bag}"
     player = config.load(None, settings).get(registry.PLAYER, {}) | {"recording": named}
     sections = {registry.PLAYER: player}
-    recording = formats.opened(config.typed(sections, registry.PLAYER, Config))
+    with bar(f"reading {bag}"):
+        recording = formats.opened(config.typed(sections, registry.PLAYER, Config))
     with bar(f"writing {log}") as progress:
         imported = write_senses(recording, formats.named(named).title, log, progress)
 

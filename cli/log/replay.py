@@ -136,8 +136,8 @@ def replay(
     reader = LogReader(log)
     bus = ZenohBus(connect, agent)
     try:
-        with Keys(Stop(), start_paused).listening() as keys:
-            played = Player(reader, bus, choices, keys).play()
+        with Keys(Stop(), start_paused).listening() as keys, bar(f"playing {log}") as progress:
+            played = Player(reader, bus, choices, keys).play(progress)
     finally:
         bus.close()
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from cogmap.cli.launch.plan import Choices
+from cogmap.cli.progress import bar
 from cogmap.cli.run.options import AROUND_S
 from cogmap.errors import UsageError
 from cogmap.runtime import config
@@ -55,7 +56,8 @@ def opened(choices: Choices, given: Sections) -> Recording | None:
         return None
 
     player = given.get(registry.PLAYER, {}) | {"recording": choices.recording}
-    return formats.opened(config.typed({registry.PLAYER: player}, registry.PLAYER, Config))
+    with bar(f"reading {formats.named(choices.recording).title}"):
+        return formats.opened(config.typed({registry.PLAYER: player}, registry.PLAYER, Config))
 
 
 def with_settings(given: Sections, recording: Recording) -> Sections:

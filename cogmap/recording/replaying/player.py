@@ -15,7 +15,7 @@ from cogmap.errors import UsageError
 from cogmap.recording.replaying.pacing import ClockPublisher, Control, Pacer
 from cogmap.recording.selection import to_play
 from cogmap.recording.storage.format import MAX_TIME_NS
-from cogmap.recording.storage.reader import LogReader
+from cogmap.recording.storage.reader import LogReader, Progress
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Topic
 
@@ -74,8 +74,10 @@ class Player:
             self._topics = [topic for topic in self._topics if topic is not topics.CLOCK]
             self._clock = ClockPublisher(bus, SOURCE, choices.rate, choices.clock_hz)
 
-    def play(self) -> Played:
-        """Play, until the end of the log or until asked to end."""
+    def play(self, progress: Progress = lambda share: None) -> Played:
+        """Play, until the end of the log or until asked to end; `progress` is called with the share
+        of this round that is played.
+        """
         for topic in self._topics:
             self._bus.declare(topic)
         self._bus.announce(Member(SOURCE, SOURCE))
@@ -83,7 +85,7 @@ class Player:
         began_s = monotonic()
         rounds = 0
         while not self._control.asked and (self._choices.loop or rounds == 0):
-            self._play_once()
+            self._play_once(progress)
             rounds += 1
         return Played(
             messages=dict(self._played),
@@ -92,7 +94,7 @@ class Player:
             late_max_s=self._pacer.late_max_s,
         )
 
-    def _play_once(self) -> None:
+    def _play_once(self, progress: Progress) -> None:
         """Play the log once; the clock ends with its newest stamp.
 
         Each round is a new incarnation of every source, as its numbers begin anew.
@@ -103,6 +105,7 @@ class Player:
         end_s = self._choices.end_s
         end_ns = MAX_TIME_NS if end_s is None else begin_ns + int(end_s * 1e9)
         self._pacer.begin(start_ns)
+        length_ns = max(1, min(end_ns, self._reader.span_ns[1]) - start_ns)
 
         for record in self._reader.records(self._topics, start_ns=start_ns, end_ns=end_ns):
             if not self._pacer.wait_until(record.log_time_ns, self._clock):
@@ -126,6 +129,7 @@ class Player:
             )
             self._bus.publish(record.topic, self._reader.payload(record), renewed)
             self._played[record.topic_name] += 1
+            progress((record.log_time_ns - start_ns) / length_ns)
             if self._clock is not None:
                 self._clock.see(stub.stamp_ns)
 

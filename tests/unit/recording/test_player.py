@@ -201,3 +201,15 @@ def test_a_rate_that_stands_still_is_refused(path: Path) -> None:
 
     with pytest.raises(UsageError, match="rate 0"):
         Player(LogReader(path), MemoryBus(MemoryNetwork()), standing, Script())
+
+
+def test_the_share_that_is_played_rises_to_the_whole_of_each_round(path: Path) -> None:
+    shares: list[float] = []
+    network = MemoryNetwork()
+    choices = Choices(rate=FAST, topics=[topics.ODOMETRY])
+
+    Player(LogReader(path), MemoryBus(network), choices, Script()).play(shares.append)
+
+    assert shares == sorted(shares)
+    assert len(shares) == COUNT
+    assert 0.0 <= shares[0] < shares[-1] <= 1.0
