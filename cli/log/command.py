@@ -18,6 +18,10 @@ VERBS = {
         "cogmap.cli.log.export:export",
         "Write a log for other tools: tables, Foxglove, Rerun, ROS.",
     ),
+    "convert": (
+        "cogmap.cli.log.convert:convert",
+        "Write a log or a bag as what a name ends with.",
+    ),
     "import": ("cogmap.cli.log.importing:import_bag", "Make a log of a bag of ROS."),
     "replay": ("cogmap.cli.log.replay:replay", "Play a log onto the bus, or into modules."),
     "diff": ("cogmap.cli.log.inspect:diff", "Compare two logs message by message."),

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from cogmap.cli.log import report
 from cogmap.cli.options import json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.progress import bar
@@ -109,8 +110,5 @@ def export(
 
     if as_json:
         print_json(written)
-        return
-    for place, counts in written.items():
-        click.echo(f"{place}: {len(counts)} topics")
-        for name, count in counts.items():
-            click.echo(f"  {name}: {count}")
+    else:
+        report.print_exported(written)

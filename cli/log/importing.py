@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import click
+from mcap.writer import CompressionType
 from msgspec.structs import replace
 
 from cogmap.bus.codec import Envelope, encode
@@ -58,29 +59,51 @@ def import_bag(bag: Path, log: Path, settings: tuple[str, ...], as_json: bool) -
     BAG is a bag of ROS 1, the folder of one of ROS 2, or an MCAP file of ROS 2, as `cogmap run
     --recording bag:BAG` plays it; --set names the topics where it has several.
     """
+    imported = import_senses(bag, log, settings)
+    if as_json:
+        print_json(imported)
+    else:
+        print_imported(imported, log)
+
+
+def print_imported(imported: Imported, log: Path) -> None:
+    """Print how many views are in a log that was made of a bag, and what is left out."""
+    click.echo(f"{log}: {imported.views} views, {imported.skipped} left out")
+    for reason in imported.reasons:
+        click.echo(f"  {reason}")
+
+
+def import_senses(
+    bag: Path,
+    log: Path,
+    settings: tuple[str, ...],
+    compression: CompressionType = CompressionType.LZ4,
+) -> Imported:
+    """Write the senses in a bag as a new log; `settings` are of --set. Raises UsageError if the bag
+    cannot be played, and LogError if the log exists or the disk refuses.
+    """
     named = f"bag:{bag}"
     player = config.load(None, settings).get(registry.PLAYER, {}) | {"recording": named}
     sections = {registry.PLAYER: player}
     with bar(f"reading {bag}"):
         recording = formats.opened(config.typed(sections, registry.PLAYER, Config))
     with bar(f"writing {log}") as progress:
-        imported = write_senses(recording, formats.named(named).title, log, progress)
-
-    if as_json:
-        print_json(imported)
-        return
-    click.echo(f"{log}: {imported.views} views, {imported.skipped} left out")
-    for reason in imported.reasons:
-        click.echo(f"  {reason}")
+        return write_senses(recording, formats.named(named).title, log, compression, progress)
 
 
-def write_senses(recording: Recording, title: str, path: Path, progress: Progress) -> Imported:
+def write_senses(
+    recording: Recording,
+    title: str,
+    path: Path,
+    compression: CompressionType,
+    progress: Progress,
+) -> Imported:
     """Write what a recording plays as the log of a run in which it was played, with the settings
     that it asks for. Raises LogError if the file exists, or the disk refuses.
     """
     began_ns = time.time_ns()
     about = {"config": json.dumps(recording.settings), "began_ns": str(began_ns)}
-    writer = LogWriter(path, to_record(), about)
+    writer = LogWriter(path, to_record(), about, compression)
     playhead = Playhead(recording, title)
     imported = Imported()
 

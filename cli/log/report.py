@@ -152,6 +152,14 @@ def print_recovery(recovery: Recovery) -> None:
         )
 
 
+def print_exported(written: dict[str, dict[str, int]]) -> None:
+    """Print how many messages were written of each topic, by the place that they are in."""
+    for place, counts in written.items():
+        click.echo(f"{place}: {len(counts)} topics")
+        for name, count in counts.items():
+            click.echo(f"  {name}: {count}")
+
+
 def print_copied(copied: Copied) -> None:
     """Print what is in a log that was made of others."""
     number = sum(copied.messages.values())
