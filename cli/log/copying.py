@@ -33,6 +33,7 @@ Examples:
 _MERGE_EPILOG = """\b
 Examples:
   cogmap log merge runs/latest/log.mcap runs/latest/log-2.mcap -o whole.mcap
+  cogmap log merge drive*.mcap -o whole.mcap    a recording that was split
 """
 _path = click.Path(path_type=Path)
 
@@ -86,7 +87,8 @@ def filter_(
 def merge(sources: tuple[Path, ...], target: Path, compression: str, as_json: bool) -> None:
     """Write the messages of several logs of one agent as the new log OUT, in order of their times.
 
-    A message that several of them hold is there once. The configuration is that of the first.
+    A message that several of them hold is there once. The configuration is that of the log that
+    begins first.
     """
     part = Part(topics=selection.to_record())
     with bar(f"writing {target.name}") as progress:

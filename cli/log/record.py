@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import time
 from pathlib import Path
 
@@ -37,6 +38,7 @@ Examples:
   cogmap log record -o drive.mcap -x camera  everything but the camera
   cogmap log record odometry motor/command   two topics
   cogmap log record -e '^workspace/'         what the workspace publishes
+  cogmap log record -o drive.mcap --split-s 600    drive.mcap, drive-2.mcap ...
 """
 
 
@@ -56,6 +58,18 @@ Examples:
     "--max-duration",
     type=FiniteRange(min=0, min_open=True),
     help="End after this many seconds.",
+)
+@click.option(
+    "--split-s",
+    type=FiniteRange(min=0, min_open=True),
+    metavar="SECONDS",
+    help="Begin another file after so long: OUTPUT-2, OUTPUT-3 ...",
+)
+@click.option(
+    "--split-mb",
+    type=FiniteRange(min=0, min_open=True),
+    metavar="MB",
+    help="Begin another file once one has so many megabytes.",
 )
 @compression_option
 @click.option(
@@ -77,6 +91,8 @@ def record(
     regex: str,
     exclude: str,
     max_duration: float | None,
+    split_s: float | None,
+    split_mb: float | None,
     compression: str,
     instance: str,
     tied: bool,
@@ -90,7 +106,8 @@ def record(
 
     The file is written four times a second: killing the recorder loses at most 0.25 s. At the end
     the missing messages of each publisher are printed, and noted in the file. The file also holds
-    the configuration, which `cogmap log replay` uses.
+    the configuration, which `cogmap log replay` uses. Of a recording that was split, `cogmap log
+    merge` makes one log again: a graph, and a replay into modules, need it from its beginning.
     """
     if everything and (topics or regex):
         raise click.UsageError("--all records every topic: leave it out, or the choice of topics")
@@ -109,6 +126,10 @@ def record(
             about,
             instance=instance,
             compression=COMPRESSIONS[compression],
+            split=recorder.Split(
+                max_s=split_s or math.inf,
+                max_bytes=1e6 * (split_mb or math.inf),
+            ),
         )
     except LogError:
         bus.close()

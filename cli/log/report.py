@@ -27,6 +27,11 @@ def print_summary(summary: Summary) -> None:
         f"{summary.path}: {number} messages on {len(summary.messages)} topics in "
         f"{summary.duration_s:.1f} s, {megabytes(summary.size_bytes)}"
     )
+    if len(summary.paths) > 1:
+        click.echo(
+            f"It is in {len(summary.paths)} files: `cogmap log merge {' '.join(summary.paths)} "
+            "-o WHOLE` makes one of them."
+        )
     if summary.never_drop_whole:
         click.echo("No gap in any NEVER_DROP topic.")
     for sentence in summary.gaps:

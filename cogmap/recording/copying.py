@@ -61,11 +61,11 @@ def copy(
 ) -> Copied:
     """Write a part of the logs `sources` into the new log `target`, in order of log time.
 
-    It has the configuration of the first. Raises LogError if one cannot be read, UsageError if they
-    are of different agents or versions or the part is empty, and StorageError if `target` exists or
-    cannot be written.
+    It has the configuration of the one that begins first. Raises LogError if one cannot be read,
+    UsageError if they are of different agents or versions or the part is empty, and StorageError if
+    `target` exists or cannot be written.
     """
-    readers = [LogReader(source) for source in sources]
+    readers = sorted(map(LogReader, sources), key=lambda reader: reader.span_ns)
     about = _about(readers)
     recorded = {channel.topic for reader in readers for channel in reader.channels.values()}
     wanted = [topic for topic in ALL if topic in part.topics and topic.name in recorded]

@@ -7,6 +7,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
@@ -33,7 +34,8 @@ class Summary(msgspec.Struct, kw_only=True):
     `lost`: missing by the sources' numbers; `unrecovered`: given up by the bus; `dropped`: found no
     room here; `rejected`: were no messages of their topic. `gaps` are sentences;
     `never_drop_whole`: no NEVER_DROP topic misses any. `queue_peak_mb` is the most that ever waited
-    to be written.
+    to be written. `paths` are the files, more than one if the recording was split: each file has
+    the summary of all that was recorded until its end.
     """
 
     path: str
@@ -47,6 +49,18 @@ class Summary(msgspec.Struct, kw_only=True):
     gaps: list[str]
     never_drop_whole: bool
     queue_peak_mb: float = 0.0
+    paths: list[str] = []
+
+
+@dataclass(frozen=True, kw_only=True)
+class Split:
+    """When another file begins: once one is so large, or so old. Without either, never."""
+
+    max_bytes: float = math.inf
+    max_s: float = math.inf
+
+
+WHOLE = Split()
 
 
 class Recorder:
@@ -54,7 +68,8 @@ class Recorder:
     thread, `close()` it.
 
     `about` is kept in the file: the agent, the configuration, what else is to be known of the run.
-    `limit_bytes` may wait to be written. Raises LogError if the file cannot be written.
+    `limit_bytes` may wait to be written. Where the recording is `split`, files follow whose names
+    have a number, such as `drive-2.mcap`. Raises LogError if the file cannot be written.
     """
 
     def __init__(
@@ -67,23 +82,28 @@ class Recorder:
         limit_bytes: int = LIMIT_BYTES,
         instance: str = MODULE,
         compression: CompressionType = CompressionType.LZ4,
+        split: Split = WHOLE,
     ) -> None:
-        now_ns = time.time_ns()
         self._bus = bus
         self._topics = topics
+        self._about = about
         self._instance = instance
-        self._writer = LogWriter(path, topics, {"began_ns": str(now_ns), **about}, compression)
+        self._compression = compression
+        self._split = split
+        self._paths = [path]
+        self._size_bytes = 0
+        self._writer = self._opened(path)
         self._queue = WriteQueue(limit_bytes)
         self._intake = Intake()
         self._flush_timer = FlushTimer()
-        self._sequences = SequenceTracker(since_ns=now_ns)
+        self._sequences = SequenceTracker(since_ns=time.time_ns())
         self._unrecovered: Counter[str] = Counter()
-        self._began_s = time.monotonic()
+        self._began_s = self._part_began_s = time.monotonic()
 
     @property
     def path(self) -> Path:
-        """Return the file that it writes."""
-        return self._writer.path
+        """Return the file that it writes, the first of a split recording."""
+        return self._paths[0]
 
     @property
     def received(self) -> Counter[str]:
@@ -105,16 +125,40 @@ class Recorder:
         due_s = self._flush_timer.due_in_s()
         found = self._take(due_s if timeout_s is None else min(timeout_s, due_s))
         if self._flush_timer.due_in_s() == 0.0:
-            self._writer.flush()
-            self._flush_timer.reset()
+            self.flush()
         return found
+
+    def flush(self) -> None:
+        """Write out what has been received, and begin another file if this one is as large, or as
+        old, as one may be. Raises LogError if the disk takes no more.
+        """
+        self._writer.flush()
+        self._flush_timer.reset()
+        age_s = time.monotonic() - self._part_began_s
+        if age_s >= self._split.max_s or self._writer.size_bytes >= self._split.max_bytes:
+            self._begin_part()
 
     def close(self) -> Summary:
         """Leave the bus, write what waits, and finish the file. Raises LogError."""
         self._bus.close()
         while self._take(0.0):
             pass
+        return self._finish()
 
+    def _opened(self, path: Path) -> LogWriter:
+        facts = {"began_ns": str(time.time_ns()), **self._about}
+        return LogWriter(path, self._topics, facts, self._compression)
+
+    def _begin_part(self) -> None:
+        """Finish this file, and begin another."""
+        self._finish()
+        path = self.path.with_stem(f"{self.path.stem}-{len(self._paths) + 1}")
+        self._writer = self._opened(path)
+        self._paths.append(path)
+        self._part_began_s = time.monotonic()
+
+    def _finish(self) -> Summary:
+        """Finish a file. Returns the summary of the recording until now, which is noted in it."""
         lost = self._sequences.lost()
         dropped = dict(self._queue.dropped)
         incomplete = {*lost, *dropped, *self._unrecovered}
@@ -131,10 +175,12 @@ class Recorder:
             gaps=self._sequences.gaps(),
             never_drop_whole=not never_drop,
             queue_peak_mb=self._queue.peak_bytes / 1e6,
+            paths=[str(path) for path in self._paths],
         )
         self._writer.note(layout.SUMMARY, {"json": msgspec.json.encode(summary).decode()})
         self._writer.close()
-        summary.size_bytes = self.path.stat().st_size
+        self._size_bytes += self._writer.path.stat().st_size
+        summary.size_bytes = self._size_bytes
         return summary
 
     def abandon(self) -> None:

@@ -82,6 +82,11 @@ class LogWriter:
             facts = {"delivery": topic.delivery.name, "about": topic.scope.name}
             self._channels[topic] = self._channel(topic.name, layout.schema_of(topic), facts)
 
+    @property
+    def size_bytes(self) -> int:
+        """Return how much of it is in the file."""
+        return self._file.tell()
+
     def write(
         self, topic: Topic, payload: bytes | memoryview, envelope: Envelope | None, received_ns: int
     ) -> None:

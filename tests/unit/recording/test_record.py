@@ -12,7 +12,9 @@ from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Member
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from cogmap.errors import LogError
-from cogmap.recording.recorder import Recorder, Summary
+from cogmap.recording.copying import Part, copy
+from cogmap.recording.info import info
+from cogmap.recording.recorder import WHOLE, Recorder, Split, Summary
 from cogmap.recording.selection import to_record
 from cogmap.recording.storage.reader import LogReader
 from cogmap.schemas import topics
@@ -24,12 +26,12 @@ from tests.support.logs import scan
 class Recorded:
     """A network with a recorder on it, and a bus to publish on."""
 
-    def __init__(self, path: Path, limit_bytes: int = 2**20) -> None:
+    def __init__(self, path: Path, limit_bytes: int = 2**20, split: Split = WHOLE) -> None:
         self.network = MemoryNetwork()
         self.bus = MemoryBus(self.network)
         about = {"agent": "a", "config": "{}"}
         self.recorder = Recorder(
-            MemoryBus(self.network), path, to_record(), about, limit_bytes=limit_bytes
+            MemoryBus(self.network), path, to_record(), about, limit_bytes=limit_bytes, split=split
         )
         self.recorder.open()
 
@@ -243,3 +245,39 @@ def test_a_log_is_read_however_it_is_compressed(path: Path, compression: Compres
     recorder.close()
 
     assert LogReader(path).about("summary")
+
+
+def test_a_recording_is_split_into_files_of_which_merge_makes_one(path: Path) -> None:
+    recorded = Recorded(path, split=Split(max_s=1e-9))
+    for number in range(3):
+        recorded.publish(odometry(number), 1 + number)
+        assert recorded.recorder.pump()
+        recorded.recorder.flush()
+    summary = recorded.end()
+
+    parts = [Path(part) for part in summary.paths]
+    assert len(parts) >= 4
+    assert [part.name for part in parts[:3]] == ["log.mcap", "log-2.mcap", "log-3.mcap"]
+    assert summary.messages == {"odometry": 3}
+    assert summary.size_bytes == sum(part.stat().st_size for part in parts)
+    assert all(info(part).finished for part in parts)
+
+    whole = path.with_name("whole.mcap")
+    copied = copy(sorted(parts), whole, Part(topics=to_record()))
+    assert copied.messages == {"odometry": 3}
+    assert not info(whole).gaps
+
+
+def test_a_file_that_is_large_enough_is_the_last_but_one(path: Path) -> None:
+    empty = path.with_name("empty.mcap")
+    Recorded(empty)
+    recorded = Recorded(path, split=Split(max_bytes=empty.stat().st_size + 500))
+    recorded.recorder.flush()
+    assert not path.with_name("log-2.mcap").exists()
+
+    for number in range(100):
+        recorded.publish(odometry(number), 1 + number)
+        recorded.recorder.pump()
+    recorded.recorder.flush()
+
+    assert path.with_name("log-2.mcap").exists()
