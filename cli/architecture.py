@@ -19,6 +19,7 @@ from cogmap.services.codelets.table import own_codelets
 
 PAGE = Path("docs/architecture.md")
 OBSERVERS = "observers"
+EVERY = "every process"
 _ARROWS = {Delivery.NEVER_DROP: "==>", Delivery.LATEST_WINS: "-->", Delivery.ON_REQUEST: "-.->"}
 _WITHOUT_SCREEN = {"sim": {"egl": False}}
 
@@ -99,8 +100,8 @@ def topic_table(modules: list[Module]) -> str:
             f"{topic.rate_hz:g} Hz" if topic.rate_hz else "as it happens",
             topic.delivery.value,
             topic.scope.value,
-            ", ".join(senders) or "every process",
-            ", ".join(receivers),
+            ", ".join(senders) or EVERY,
+            ", ".join(receivers) or EVERY,
         ]
         lines.append(f"| {' | '.join(facts)} |")
     return "\n".join([*lines, ""])
@@ -124,7 +125,13 @@ def _kinds(written: frozenset[Written]) -> str:
 
 
 def ends(topic: Topic, modules: list[Module]) -> tuple[list[str], list[str]]:
-    """Find who sends `topic` and who receives it: modules by name, else the observers."""
+    """Find who sends `topic` and who receives it: modules by name, else the observers; none where
+    it is every process.
+    """
+    if topic is topics.SETTINGS_REQUEST:
+        return [OBSERVERS], []
+    if topic is topics.SETTINGS:
+        return [], [OBSERVERS]
     if topic.delivery is not Delivery.ON_REQUEST:
         senders = [module.name for module in modules if topic in module.emits]
         receivers = [module.name for module in modules if topic in module.handlers]

@@ -44,6 +44,7 @@ VERBS = {
     "node": ("cogmap.cli.node:node", "List running processes, and what each one does."),
     "new": ("cogmap.cli.new.command:new", "Write a new codelet or module to begin with."),
     "ros2": ("cogmap.cli.ros2:ros2", "Let a robot that runs ROS 2 take the place of sim."),
+    "param": ("cogmap.cli.param:param", "Show the settings of a running system."),
     "router": ("cogmap.cli.processes:router", "Run the router that all modules connect to."),
     "run": ("cogmap.cli.run.command:run", "Drive through a simulated town, or play a recording."),
     "schemes": ("cogmap.cli.schemes:schemes", "Write the guidance schemes learned on a drive."),

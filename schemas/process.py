@@ -72,3 +72,16 @@ class Health(Message, kw_only=True, frozen=True):
     compute_p99_ms: Finite
     memory_mb: Finite
     notes: list[str] = []
+
+
+class SettingsRequest(Message, kw_only=True, frozen=True):
+    """Asks what settings the processes were started with: every one of them answers."""
+
+
+class Settings(Message, kw_only=True, frozen=True):
+    """The configuration that `instance` was started with, as the text of a TOML file; keys that are
+    not in it have their default.
+    """
+
+    instance: Name
+    toml: str

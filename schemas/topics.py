@@ -116,6 +116,8 @@ TRUE_TOWN = Topic(
 PLAYBACK = Topic("truth/playback", process.Playback, 0, _NEVER, Scope.TRUTH, sensed=True)
 PRESENCE = Topic("presence", process.Presence, 0, _NEVER, Scope.PROCESS, shared=True)
 HEALTH = Topic("health", process.Health, 0, _LATEST, Scope.PROCESS, shared=True)
+SETTINGS = Topic("settings", process.Settings, 0, _REQUEST, Scope.PROCESS)
+SETTINGS_REQUEST = Topic("settings_request", process.SettingsRequest, 0, _REQUEST, Scope.PROCESS)
 
 ALL: tuple[Topic, ...] = tuple(
     value for value in list(globals().values()) if isinstance(value, Topic)

@@ -8,6 +8,7 @@ from typing import Any, TypedDict, TypeVar, Unpack
 
 import click
 import msgspec
+import tomli_w
 
 from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name
 from cogmap.runtime import config, environment
@@ -15,6 +16,8 @@ from cogmap.runtime.command import run_command
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
 from cogmap.runtime.process import await_line, run_module
+from cogmap.schemas import topics
+from cogmap.schemas.process import Settings
 
 C = TypeVar("C", bound=msgspec.Struct)
 F = TypeVar("F", bound=Callable[..., Any])
@@ -102,11 +105,13 @@ def module_options(command: F) -> F:
 
 
 def run_with(options: ModuleOptions, build: Callable[[Sections, str], Module]) -> None:
-    """Run the module that `build` makes of the configuration and the name of an instance. Raises as
-    `run_module` does, and ConfigError.
+    """Run the module that `build` makes of the configuration and the name of an instance; whoever
+    asks is told that configuration. Raises as `run_module` does, and ConfigError.
     """
     sections = config.load(options["config_path"], options["settings"])
     module = build(sections, options["instance"])
+    settings = Settings(instance=module.instance, toml=tomli_w.dumps(sections))
+    module.serve(topics.SETTINGS_REQUEST, topics.SETTINGS, lambda _request: settings)
     if options["held"] and not await_line():
         return
 
