@@ -1,4 +1,4 @@
-"""The space bar pauses a replay, where there is a terminal."""
+"""Keys pause a replay, and step through it, where there is a terminal."""
 
 from __future__ import annotations
 
@@ -16,13 +16,18 @@ import click
 
 from cogmap.runtime.process import Stop
 
+PAUSED = "paused: space continues, s goes on by a view"
+
 
 class Keys:
-    """Waits for time to pass, for a signal, and, on a terminal, for the space bar."""
+    """Waits for time to pass, for a signal, and, on a terminal, for keys: the space bar pauses and
+    continues, `s` goes on by a view.
+    """
 
     def __init__(self, stop: Stop, paused: bool) -> None:
         self._stop = stop
         self.paused = paused
+        self._steps = 0
         self._wakes: list[socket.socket] = []
 
     @property
@@ -59,6 +64,13 @@ class Keys:
             for end in self._wakes:
                 end.close()
 
+    def take_step(self) -> bool:
+        """Return whether it is asked to go on for a view; each wish once."""
+        if not self._steps:
+            return False
+        self._steps -= 1
+        return True
+
     def wait(self, timeout_s: float) -> bool:
         """Wait so long, or until asked to end, to pause or to continue. Returns whether to end."""
         if not self._wakes:
@@ -66,7 +78,14 @@ class Keys:
 
         terminal = sys.stdin.fileno()
         ready, _, _ = select.select([terminal, self._wakes[0]], [], [], timeout_s)
-        if terminal in ready and b" " in os.read(terminal, 64):
-            self.paused = not self.paused
-            click.echo("paused: space continues" if self.paused else "continuing", err=True)
+        if terminal in ready:
+            self._press(os.read(terminal, 64))
         return self._stop.asked
+
+    def _press(self, keys: bytes) -> None:
+        """Do what keys mean: a step pauses too."""
+        steps = keys.count(b"s")
+        if b" " in keys or (steps and not self.paused):
+            self.paused = not self.paused
+            click.echo(PAUSED if self.paused else "continuing", err=True)
+        self._steps += steps

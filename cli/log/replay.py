@@ -55,9 +55,7 @@ Examples:
 @start_option
 @until_option
 @click.option("-l", "--loop", is_flag=True, help="Play again and again.")
-@click.option(
-    "--start-paused", is_flag=True, help="Begin paused; the space bar continues and pauses."
-)
+@click.option("--start-paused", is_flag=True, help="Begin paused; keys continue, step and pause.")
 @click.option(
     "--clock",
     "clock_hz",
@@ -97,6 +95,8 @@ def replay(
     as_json: bool,
 ) -> None:
     """Play LOG back onto the bus, or feed it to modules with --into.
+
+    On a terminal the space bar pauses and continues, and s goes on by a view.
 
     With --into, each recorded instance of the module receives the recorded messages in the same
     order, with the recorded configuration, and its output is compared with the log. Ends with 1 if

@@ -25,6 +25,9 @@ class Control(Protocol):
     def paused(self) -> bool:
         """Return whether it is asked to stand still."""
 
+    def take_step(self) -> bool:
+        """Return whether it is asked to go on for a view although it is paused; each wish once."""
+
     def wait(self, timeout_s: float) -> bool:
         """Wait so long, or until asked to end, to pause or to continue. Returns whether to end."""
 
@@ -56,7 +59,8 @@ class ClockPublisher:
 
 
 class Pacer:
-    """Turns log time into waiting, `rate` times as fast. Time stands still while paused.
+    """Turns log time into waiting, `rate` times as fast. Time stands still while paused, but for
+    a step, which lasts until `end_step`.
 
     `late_max_s` is the largest delay of a message.
     """
@@ -68,6 +72,7 @@ class Pacer:
         self._start_log_ns = 0
         self._start_ns = 0
         self._next_clock_ns = 0
+        self._is_stepping = False
 
     def begin(self, log_time_ns: int) -> None:
         """Let `log_time_ns` be now."""
@@ -82,7 +87,7 @@ class Pacer:
         due_ns = int((log_time_ns - self._start_log_ns) / self._rate)
         while not self._control.asked:
             now_ns = time.monotonic_ns() - self._start_ns
-            if self._control.paused:
+            if self._stands():
                 # The pause is left out of the time.
                 self._control.wait(_PAUSE_S)
                 self._start_ns = time.monotonic_ns() - now_ns
@@ -100,3 +105,14 @@ class Pacer:
                 return True
             self._control.wait(max(0, until_ns - now_ns) / 1e9)
         return False
+
+    def end_step(self) -> None:
+        """Let time stand again, if it is to be paused."""
+        self._is_stepping = False
+
+    def _stands(self) -> bool:
+        """Decide whether time stands, and begin a step that is asked for."""
+        if not self._control.paused:
+            return False
+        self._is_stepping = self._is_stepping or self._control.take_step()
+        return not self._is_stepping

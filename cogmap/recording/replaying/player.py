@@ -20,6 +20,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.topics import Topic
 
 SOURCE = "replay"
+VIEWS = (topics.STEREO, topics.PERCEPTS)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +68,10 @@ class Player:
         recorded = {channel.topic for channel in reader.channels.values()}
         chosen = choices.topics
         self._topics = [each for each in topics.ALL if each.name in recorded and each in chosen]
+
+        # A step ends with a view, as it is sensed or recognized; without any, with each message.
+        views = [topic for topic in VIEWS if topic in self._topics and _has_any(reader, topic)]
+        self._steps_by = views[:1] or self._topics
 
         self._clock: ClockPublisher | None = None
         if choices.clock_hz > 0:
@@ -129,9 +134,16 @@ class Player:
             )
             self._bus.publish(record.topic, self._reader.payload(record), renewed)
             self._played[record.topic_name] += 1
+            if record.topic in self._steps_by:
+                self._pacer.end_step()
             progress((record.log_time_ns - start_ns) / length_ns)
             if self._clock is not None:
                 self._clock.see(stub.stamp_ns)
 
         if self._clock is not None:
             self._clock.publish()
+
+
+def _has_any(reader: LogReader, topic: Topic) -> bool:
+    """Decide whether a log has messages on a topic: a channel alone may be empty."""
+    return next(reader.records([topic]), None) is not None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from cogmap.bus.codec import Envelope, encode
@@ -19,8 +20,8 @@ from cogmap.runtime.delivery.intake import Intake
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock, Presence
-from cogmap.testing import odometry
-from tests.support.logs import SECOND_NS
+from cogmap.testing import odometry, percepts
+from tests.support.logs import SECOND_NS, write_log
 
 MILLISECOND_NS = 10**6
 COUNT = 10
@@ -29,10 +30,15 @@ AGE_NS = 5 * MILLISECOND_NS
 
 
 class Script:
-    """Never waits; ends after so many calls, and pauses or continues at those in `pauses`."""
+    """Never waits; ends after so many calls, pauses or continues at those in `pauses`, and wishes
+    so many steps.
+    """
 
-    def __init__(self, end_after: int | None = None, pauses: tuple[int, ...] = ()) -> None:
+    def __init__(
+        self, end_after: int | None = None, pauses: tuple[int, ...] = (), steps: int = 0
+    ) -> None:
         self.calls = 0
+        self._steps = steps
         self.paused = False
         self._end_after = end_after
         self._pauses = pauses
@@ -40,6 +46,10 @@ class Script:
     @property
     def asked(self) -> bool:
         return self._end_after is not None and self.calls >= self._end_after
+
+    def take_step(self) -> bool:
+        self._steps -= 1
+        return self._steps >= 0
 
     def wait(self, timeout_s: float) -> bool:
         self.calls += 1
@@ -213,3 +223,24 @@ def test_the_share_that_is_played_rises_to_the_whole_of_each_round(path: Path) -
     assert shares == sorted(shares)
     assert len(shares) == COUNT
     assert 0.0 <= shares[0] < shares[-1] <= 1.0
+
+
+def test_a_step_of_a_paused_replay_ends_with_a_view(tmp_path: Path) -> None:
+    rows = [odometry(0), percepts(1), odometry(1), odometry(2), percepts(2), odometry(3)]
+    numbered = [msgspec.structs.replace(row, seq=seq) for seq, row in enumerate(rows)]
+    path = write_log(tmp_path / "log.mcap", enumerate(numbered, SECOND_NS))
+    script = Script(end_after=1, steps=2)
+    script.paused = True
+
+    _, played = play(path, Choices(rate=FAST), script)
+
+    assert played.messages == {"odometry": 3, "epam/percepts": 2}
+
+
+def test_without_views_a_step_is_a_message(path: Path) -> None:
+    script = Script(end_after=1, steps=3)
+    script.paused = True
+
+    _, played = play(path, Choices(rate=FAST, topics=[topics.ODOMETRY]), script)
+
+    assert played.messages == {"odometry": 3}
