@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from cogmap.cli.progress import bar
 from cogmap.errors import LogError
 from cogmap.recording.log import open_log
 from cogmap.runtime.state.new_file import new_file
@@ -52,8 +53,11 @@ def schemes(log: Path, out: Path | None) -> None:
 def learned(path: Path) -> list[GuidanceScheme]:
     """Read the guidance schemes of a log, as they were published last. Raises LogError."""
     found: dict[str, GuidanceScheme] = {}
-    for entry in open_log(path).messages(topics.BEHAVIOURS.name):
-        assert isinstance(entry.message, Behaviours)
-        found |= {scheme.name: scheme for scheme in entry.message.learned}
+    log = open_log(path)
+    with bar(f"reading {path}") as progress:
+        for entry in log.messages(topics.BEHAVIOURS.name):
+            assert isinstance(entry.message, Behaviours)
+            found |= {scheme.name: scheme for scheme in entry.message.learned}
+            progress(entry.time_s / max(log.duration_s, 1e-9))
 
     return list(found.values())

@@ -77,17 +77,17 @@ def convert(
 
     if settings:
         raise UsageError(f"--set is for bags, and {source} is none: leave it out")
-    with bar(f"writing {target}") as progress:
-        if ending == LOG:
-            part = Part(topics=selection.to_record())
-            chosen = COMPRESSIONS[compression]
+    if ending == LOG:
+        part = Part(topics=selection.to_record())
+        chosen = COMPRESSIONS[compression]
+        with bar(f"writing {target}") as progress:
             copied = copy([source], target, part, compression=chosen, progress=progress)
-            _tell(copied, as_json, lambda: report.print_copied(copied))
-            return
+        _tell(copied, as_json, lambda: report.print_copied(copied))
+        return
 
-        with open_log(source) as log:
-            written = {str(target): VIEWED[ending](log, target, progress)}
-        _tell(written, as_json, lambda: report.print_exported(written))
+    with open_log(source) as log, bar(f"writing {target}") as progress:
+        written = {str(target): VIEWED[ending](log, target, progress)}
+    _tell(written, as_json, lambda: report.print_exported(written))
 
 
 def _tell(facts: Any, as_json: bool, in_words: Callable[[], None]) -> None:

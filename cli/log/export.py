@@ -52,8 +52,8 @@ Examples:
     "foxglove_path",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Write images, depth, poses, path, map and range scans for Foxglove into the new file "
-    "FILE; TOPICS are of no matter.",
+    help="Write images, depth, poses, path, map, range scans and needs for Foxglove into the new "
+    "file FILE; TOPICS are of no matter.",
 )
 @click.option(
     "--rerun",

@@ -79,7 +79,8 @@ def draw_map(log: Path, output: Path | None) -> None:
 
     logging.getLogger("matplotlib").setLevel(logging.WARNING)
     try:
-        plot.draw(path, tally, metrics)
+        with bar(f"drawing {path}"):
+            plot.draw(path, tally, metrics)
     except OSError as error:
         raise cannot_write(path, error) from None
     click.echo(f"{path}: {metrics.distance_m:.0f} m of driving; buildings: {headline(metrics)}")

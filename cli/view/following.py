@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import click
 
 from cogmap.bus.interface import Arrival, Bus
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.topic.observing import TICK_S, RouterWatch
+from cogmap.errors import LogError
 from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.recording.exporting.moments import OF_MIND, Drive, Moment
 from cogmap.recording.log import Entry
@@ -37,14 +38,24 @@ class Following:
             bus.subscribe(topic, self._inbox.put, self._intake.count_lost)
         replica.join()
 
-    def moments(self, timeout_s: float) -> Iterator[Moment]:
-        """Yield what there is to show of the next message; nothing if none comes in time."""
+    def show_next(self, timeout_s: float, show: Callable[[Moment], None]) -> bool:
+        """Show what there is to show of the next message. Returns whether one came in time.
+
+        One that cannot be shown, such as a view whose image is none, is rejected.
+        """
         arrival = self._inbox.take(timeout_s)
         if not isinstance(arrival, Arrival):
-            return
+            return False
+
         message = self._intake.accept(arrival)
-        if message is not None:
-            yield from self._drive.shown(self._entry(arrival, message))
+        if message is None:
+            return True
+        try:
+            for moment in self._drive.shown(self._entry(arrival, message)):
+                show(moment)
+        except LogError as error:
+            self._intake.reject(arrival.topic.name, str(error))
+        return True
 
     def counts(self) -> str:
         """Count the messages that were shown, and those that were not, by reason."""
@@ -77,6 +88,5 @@ def follow(
     router = RouterWatch(bus.session, endpoint)
     while not stop.asked:
         router.check()
-        for moment in following.moments(TICK_S):
-            show(moment)
+        following.show_next(TICK_S, show)
     click.echo(following.counts(), err=True)

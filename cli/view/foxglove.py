@@ -47,15 +47,15 @@ def foxglove(host: str, port: int, connect: str, agent: str) -> None:
 
     Any number of viewers may watch. Ctrl-C ends it. Needs `pip install 'cogmap[foxglove]'`.
     """
-    library_ = library()
-    context = library_.Context()
+    sdk = library()
+    context = sdk.Context()
     with observing(connect, agent, VIEW) as bus:
-        server = serve(library_, context, agent, host, port)
+        server = serve(sdk, context, agent, host, port)
         try:
             address = f"ws://{host}:{server.port}"
             click.echo(f"{agent} at {connect} for Foxglove: {address} (Ctrl-C ends it)")
             click.echo(f"in a browser: {server.app_url()}")
-            follow(bus, connect, SENSES, Channels(library_, context).take)
+            follow(bus, connect, SENSES, Channels(sdk, context).take)
         finally:
             server.stop()
 

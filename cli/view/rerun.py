@@ -51,16 +51,16 @@ def rerun(path: Path | None, url: str | None, connect: str, agent: str) -> None:
     if path is not None and url is not None:
         raise UsageError("--save and --url exclude each other: choose one")
 
-    library_ = library()
+    sdk = library()
     with observing(connect, agent, VIEW) as bus:
-        stream = library_.RecordingStream(APPLICATION)
+        stream = sdk.RecordingStream(APPLICATION)
         if path is None:
             send(stream, url or URL)
         else:
             save(stream, path)
         click.echo(f"{agent} at {connect} for Rerun: {path or url or URL} (Ctrl-C ends it)")
         try:
-            follow(bus, connect, SENSES, Entities(library_, stream).take)
+            follow(bus, connect, SENSES, Entities(sdk, stream).take)
         finally:
             stream.disconnect()
 

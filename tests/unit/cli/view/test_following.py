@@ -7,6 +7,7 @@ import time
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from cogmap.cli.view.following import Following
+from cogmap.errors import LogError
 from cogmap.recording.exporting.moments import Map, Moment
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
@@ -33,8 +34,8 @@ class System:
     def shown(self) -> list[Moment]:
         """All that is to be shown of what was published."""
         moments: list[Moment] = []
-        while found := list(self.following.moments(0.0)):
-            moments += found
+        while self.following.show_next(0.0, moments.append):
+            pass
         return moments
 
 
@@ -55,6 +56,17 @@ def test_a_scan_has_the_time_at_which_it_was_received() -> None:
     (moment,) = system.shown()
 
     assert moment.stamp_ns == moment.log_time_ns == 1000 * SECOND_NS
+
+
+def test_what_cannot_be_shown_is_rejected() -> None:
+    system = System()
+    system.publish(scan(1))
+
+    def refuse(_moment: Moment) -> None:
+        raise LogError("the view's image: expected a uint8 image")
+
+    assert system.following.show_next(0.0, refuse)
+    assert "1 rejected" in system.following.counts()
 
 
 def test_only_the_newest_of_scans_that_nobody_waited_for_is_shown() -> None:
