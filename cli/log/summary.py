@@ -68,10 +68,11 @@ def summary(log: Path, as_json: bool) -> None:
 def draw_map(log: Path, output: Path | None) -> None:
     """Draw the true town, and the agent's map at the end of LOG, as PNG or PDF.
 
-    The picture is the map.png of `cogmap run`: streets and buildings, the true path, the estimated
-    one and path integration alone, the streets and buildings that were learned.
+    The picture is the map.png of `cogmap run`: streets and buildings with their names, the true
+    path, the estimated one and path integration alone, the streets and buildings that were learned,
+    goals and plan. Its axes are those in which `cogmap goal X Y` takes goals.
     """
-    from cogmap.cli.plots import map as plot  # other commands have no use for matplotlib
+    from cogmap.cli.plots.map import picture as plot  # other commands have no use for matplotlib
 
     path = output or Path(f"{log.stem}-map{PLOTS[0]}")
     check_picture("-o", path, PLOTS)

@@ -14,13 +14,13 @@ from matplotlib.figure import Figure
 
 from cogmap.cli.plots.palette import (
     ESTIMATE,
-    FAINT,
     INK,
     KERB,
     OBJECT,
-    SEVERAL,
+    POSITIONS,
     STREET,
     TRUE,
+    UNCORRECTED,
     WHEELS,
 )
 from cogmap.cli.plots.sheet import describe, new_sheet, remove_scales
@@ -36,7 +36,12 @@ SHOWN = {
     "positions": "positions corrected (eq. 9)",
     "heading": "headings too",
 }
-COLOURS = {WHEELS_ALONE: FAINT, "none": WHEELS, "positions": SEVERAL[1], "heading": ESTIMATE}
+COLOURS = {
+    WHEELS_ALONE: WHEELS,
+    "none": UNCORRECTED,
+    "positions": POSITIONS,
+    "heading": ESTIMATE,
+}
 MAX_SHEETS = 8
 MARGIN_M = 120.0
 SCALE_M = 200.0

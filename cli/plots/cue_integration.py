@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, SEVERAL, TRUE
+from cogmap.cli.plots.palette import ESTIMATE, FAINT, FUSED, INK, KERB, OBJECT, SEVERAL, TRUE
 from cogmap.cli.plots.sheet import describe, new_sheet
 from cogmap.experiments.cue_integration import published
 from cogmap.experiments.cue_integration.analysis import rmse_m
@@ -23,7 +23,12 @@ NAMES = {
     Condition.BOTH: "both",
     Condition.CONFLICT: "conflict",
 }
-COLOURS = dict(zip(Condition, (SEVERAL[4], SEVERAL[0], SEVERAL[5], SEVERAL[2]), strict=True))
+COLOURS = {
+    Condition.SELF_MOTION: FUSED,
+    Condition.LANDMARKS: OBJECT,
+    Condition.BOTH: SEVERAL[2],
+    Condition.CONFLICT: SEVERAL[6],
+}
 OURS = ESTIMATE
 THEIRS = KERB
 OPTIMAL = TRUE

@@ -15,10 +15,11 @@ from cogmap.cli.plots.palette import (
     ESTIMATE,
     FAINT,
     OBJECT,
+    POSITIONS,
     ROAD,
     SEVERAL,
     TRUE,
-    WHEELS,
+    UNCORRECTED,
 )
 from cogmap.cli.plots.sheet import describe, new_sheet
 from cogmap.experiments.loop_closing.observer import Loop, Map, Replayed
@@ -36,9 +37,9 @@ def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
         parts: Any = sheet.subfigures(2, 1, height_ratios=(1.5, 1))
         above, below = parts
         before, after, end = above.subplots(1, 3, sharex=True, sharey=True)
-        _draw_map(before, positions.before, WHEELS, "a   before")
+        _draw_map(before, positions.before, UNCORRECTED, "a   before")
         replayed = "b   after the first replay, positions only (eq. 9)"
-        _draw_map(after, positions.after, SEVERAL[1], replayed)
+        _draw_map(after, positions.after, POSITIONS, replayed)
         _draw_shifts(after, positions.before, positions.after)
         _draw_map(end, heading.end, ESTIMATE, "c   in the end, headings corrected too")
         handles, labels = before.get_legend_handles_labels()
@@ -89,7 +90,7 @@ def _draw_shifts(axes: Axes, before: Map, after: Map) -> None:
 
 
 def _draw_replay(axes: Axes, replay: Replayed) -> None:
-    axes.plot(np.arange(len(replay.shifts_m)), replay.shifts_m, color=SEVERAL[1], lw=1.8)
+    axes.plot(np.arange(len(replay.shifts_m)), replay.shifts_m, color=POSITIONS, lw=1.8)
     axes.set_ylim(bottom=0)
     title = "d   shift of each place field, in the order of the replay"
     describe(axes, title, "places, from the one met again backwards", "m")

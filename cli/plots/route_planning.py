@@ -16,11 +16,9 @@ from cogmap.cli.plots.palette import (
     ESTIMATE,
     FAINT,
     KERB,
-    ROAD,
     SEVERAL,
     STREET,
     TRUE,
-    WHEELS,
 )
 from cogmap.cli.plots.sheet import describe, new_sheet, remove_scales
 from cogmap.experiments.route_planning import published
@@ -30,7 +28,7 @@ from cogmap.geometry.arrays import Floats, Indices
 from cogmap.services.codelets.planning.tours import TourSettings
 
 PEOPLE = TRUE
-PUBLISHED = SEVERAL[0]
+PUBLISHED = SEVERAL[3]
 TICKS = (4, 6, 10, 20, 40, 80, 120)
 
 
@@ -44,9 +42,9 @@ class Style(NamedTuple):
 
 # By the names of the plans in Planned.
 PLANS = {
-    "flat": Style(WHEELS, "v", "flat"),
+    "flat": Style(SEVERAL[0], "v", "flat"),
     "hierarchical": Style(ESTIMATE, "o", "hierarchical"),
-    "straightened": Style(ROAD, "^", "straightened in the end"),
+    "straightened": Style(SEVERAL[2], "^", "straightened in the end"),
 }
 
 

@@ -53,7 +53,9 @@ def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
     indented = msgspec.json.format(msgspec.json.encode(metrics))
     (drive.folder / SUMMARY_NAME).write_bytes(indented + b"\n")
 
-    from cogmap.cli.plots.map import draw  # half a second, which the start of a run is spared
+    from cogmap.cli.plots.map.picture import (
+        draw,
+    )  # half a second, which the start of a run is spared
 
     logging.getLogger("matplotlib").setLevel(logging.WARNING)
     draw(drive.folder / MAP_NAME, watch.tally, metrics)

@@ -38,6 +38,10 @@ class MapFrame:
         """Transform points (n, 2) of the map into the frame in which the agent began."""
         return se2.transform_to(self._start, points_m)
 
+    def to_map(self, points_m: Floats) -> Floats:
+        """Transform points (n, 2) of the frame in which the agent began into the map's."""
+        return se2.transform_from(self._start, points_m)
+
     def pose_from_start(self, pose: Floats) -> Floats:
         """Transform a pose (3,) of the map into the frame in which the agent began."""
         return se2.relative(self._start, pose)

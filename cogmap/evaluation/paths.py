@@ -157,6 +157,12 @@ class Paths:
         """Transform points (n, 2) of the agent's map into the world's frame."""
         return self._from_start(self._frame.from_start(points_m))
 
+    def to_map(self, points_m: Floats) -> Floats:
+        """Transform points (n, 2) of the world into the frame of the agent's map, in which goals
+        are given.
+        """
+        return self._frame.to_map(se2.transform_to(self._origin, points_m))
+
     def _from_start(self, points_m: Floats) -> Floats:
         """Transform points (n, 2) of the frame in which the agent began into the world's."""
         return se2.transform_from(self._origin, points_m)

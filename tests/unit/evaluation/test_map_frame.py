@@ -77,3 +77,11 @@ def test_the_map_lies_where_it_was_learned() -> None:
 
 def test_it_is_told_which_map_was_recalled() -> None:
     assert joined().recalled == "remembered:1"
+
+
+def test_what_is_transformed_to_the_map_and_back_is_where_it_was() -> None:
+    paths = joined()
+    points_m = np.array([[3.0, -7.0], [10.0, 20.0]])
+
+    assert paths.to_map(points_m)[1] == pytest.approx((100.0, 0.0))
+    assert paths.to_world(paths.to_map(points_m)) == pytest.approx(points_m)

@@ -13,7 +13,7 @@ from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from cogmap.cli.launch.drive_metrics import DriveMetrics, RunMetrics, drive_metrics
 from cogmap.cli.launch.watch import Watch
-from cogmap.cli.plots import map as plot
+from cogmap.cli.plots.map import picture as plot
 from cogmap.cli.run.summary import drive_rows
 from cogmap.schemas import topics
 from cogmap.schemas.array import Array

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from cogmap.cli.launch.observer import Observer
-from cogmap.cli.plots.map_structure import draw_structure
+from cogmap.cli.plots.map.structure import draw_structure
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Cells, Links
 from cogmap.schemas.nodes import ROOT_MAP, LinkKind, Map, PlaceColumn, map_id
@@ -30,4 +30,4 @@ def test_the_road_on_the_grid_of_a_sub_map_is_drawn_where_it_is_on_the_root_map(
 
     drawn_m = np.vstack([line.get_xydata() for line in axes.lines])
     np.testing.assert_allclose(drawn_m, [[8.0, 11.0]])
-    assert [line.get_label() for line in legend] == ["sub-maps, and the road on their own grids"]
+    assert [line.get_label() for line in legend] == ["sub-map, and the road on its own grid"]

@@ -7,8 +7,8 @@ from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
+from cogmap.cli.plots.map.town import draw_town
 from cogmap.cli.plots.palette import CLOSED
-from cogmap.cli.plots.town_layer import MAX_NAMES, draw_town
 from cogmap.schemas.sensing import Building, Obstacle, Pose, Street, TrueTown
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE
 
@@ -66,9 +66,16 @@ def test_a_building_that_is_no_rectangle_has_its_outline() -> None:
     assert polygon.get_xy()[:3].tolist() == [list(corner) for corner in outline_m]
 
 
-def test_names_are_shown_of_some_buildings_and_not_of_many() -> None:
-    few = _drawn([_building(number) for number in range(3)])
-    many = _drawn([_building(number) for number in range(MAX_NAMES + 1)])
+def test_the_legend_has_what_there_is_and_no_more() -> None:
+    axes = Figure().add_subplot()
+    street = Street(name="Elm Street 1", line_m=LINE_M, width_m=8.0)
+    closed = Street(name="Elm Street 2", line_m=LINE_M, width_m=8.0, closed=True)
+    homes = [_building(0), _building(1, district="Garden Hill")]
 
-    assert [text.get_text() for text in few.texts] == ["home 0", "home 1", "home 2"]
-    assert not many.texts
+    def legend_of(*streets: Street) -> list[str]:
+        town = TrueTown(seed=1, streets=list(streets), buildings=homes)
+        return [handle.get_label() for handle in draw_town(axes, town)]
+
+    homes_are = ["building", "building of Garden Hill"]
+    assert legend_of(street) == ["street", *homes_are]
+    assert legend_of(street, closed) == ["street", "barrier: the street is closed", *homes_are]

@@ -6,30 +6,29 @@ import math
 from itertools import pairwise
 from typing import Any
 
-import matplotlib.patheffects as outlines
 import numpy as np
 import numpy.typing as npt
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
-from matplotlib.patches import Polygon, Rectangle
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon, Rectangle
 from matplotlib.transforms import Affine2D
 
-from cogmap.cli.plots.palette import CHARGING, CLOSED, HOUSE, KERB, NAME, SEVERAL, STREET, WALL
+from cogmap.cli.plots.palette import CHARGING, CLOSED, DISTRICTS, HOUSE, KERB, STREET, WALL
 from cogmap.schemas.sensing import Building, Obstacle, Street, TrueTown
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE
 
 # A plus, filled.
 CHARGING_MARKER: dict[str, Any] = {"marker": "P", "ms": 9, "ls": "", "color": CHARGING}
-Colour = tuple[float, float, float]
+Handle = Patch | Line2D
+"""A sample in a legend."""
+
 Points = npt.NDArray[np.float64]
 
-DISTRICT_SHARE = 0.3
-# Names of more buildings than that would hide the map.
-MAX_NAMES = 40
 
-
-def draw_town(axes: Axes, town: TrueTown) -> None:
-    """Draw streets, obstacles, buildings (those of a district in one tint), and what is closed."""
+def draw_town(axes: Axes, town: TrueTown) -> list[Handle]:
+    """Draw streets, obstacles, buildings (those of a district in one tint), and what is closed.
+    Returns the legend of what there is.
+    """
     for wider_m, colour, order in ((1.0, KERB, 1.0), (0.0, STREET, 1.1)):
         for street in town.streets:
             line_m = np.array(street.line_m)
@@ -43,27 +42,51 @@ def draw_town(axes: Axes, town: TrueTown) -> None:
     for building in town.buildings:
         _draw_building(axes, building, tints[building.district])
 
-    if len(town.buildings) <= MAX_NAMES:
-        for building in town.buildings:
-            _draw_name(axes, building)
-
     for street in town.streets:
         if street.closed:
             _draw_barrier(axes, street)
 
+    return [*_legend_of_streets(town), *_legend_of_buildings(tints), *_legend_of_obstacles(town)]
 
-def _tints(town: TrueTown) -> dict[str, Colour]:
-    """Choose the colour of each district's buildings."""
-    tints: dict[str, Colour] = {"": to_rgb(HOUSE)}
-    districts = {building.district for building in town.buildings} - {""}
-    for number, district in enumerate(sorted(districts)):
-        colour = SEVERAL[number % len(SEVERAL)]
-        house, tint = np.array(to_rgb(HOUSE)), np.array(to_rgb(colour))
-        levels = (1 - DISTRICT_SHARE) * house + DISTRICT_SHARE * tint
-        red, green, blue = levels.tolist()
-        tints[district] = red, green, blue
+
+def _tints(town: TrueTown) -> dict[str, str]:
+    """Choose the colour of each district's buildings, and of those in none."""
+    named = sorted({building.district for building in town.buildings})
+    tints = {"": HOUSE} if "" in named else {}
+    for number, district in enumerate(name for name in named if name):
+        tints[district] = DISTRICTS[number % len(DISTRICTS)]
 
     return tints
+
+
+def _legend_of_streets(town: TrueTown) -> list[Handle]:
+    handles: list[Handle] = []
+    if town.streets:
+        handles.append(Patch(fc=STREET, ec=KERB, label="street"))
+    if any(street.closed for street in town.streets):
+        handles.append(Line2D([], [], color=CLOSED, lw=3, label="barrier: the street is closed"))
+
+    return handles
+
+
+def _legend_of_buildings(tints: dict[str, str]) -> list[Handle]:
+    handles: list[Handle] = []
+    for district, tint in tints.items():
+        name = f"building of {district}" if district else "building"
+        handles.append(Patch(fc=tint, ec=WALL, label=name))
+
+    return handles
+
+
+def _legend_of_obstacles(town: TrueTown) -> list[Handle]:
+    handles: list[Handle] = []
+    kinds = {obstacle.kind for obstacle in town.obstacles}
+    if kinds - {CHARGING_PLACE}:
+        handles.append(Patch(fc=WALL, label="tree, car and the like"))
+    if CHARGING_PLACE in kinds:
+        handles.append(Line2D([], [], label="charging place", **CHARGING_MARKER))
+
+    return handles
 
 
 def _draw_band(
@@ -108,7 +131,7 @@ def _draw_obstacle(axes: Axes, obstacle: Obstacle) -> None:
     _draw_box(axes, (pose.x_m, pose.y_m), size_m, pose.heading_rad, style)
 
 
-def _draw_building(axes: Axes, building: Building, colour: Colour) -> None:
+def _draw_building(axes: Axes, building: Building, colour: str) -> None:
     pose = building.pose
     style: dict[str, Any] = {
         "facecolor": colour,
@@ -122,20 +145,6 @@ def _draw_building(axes: Axes, building: Building, colour: Colour) -> None:
 
     size_m = (building.width_m, building.depth_m)
     _draw_box(axes, (pose.x_m, pose.y_m), size_m, pose.heading_rad, style)
-
-
-def _draw_name(axes: Axes, building: Building) -> None:
-    """Write a building's name along its lower side."""
-    pose = building.pose
-    by_width_m = abs(building.width_m * math.sin(pose.heading_rad))
-    by_depth_m = abs(building.depth_m * math.cos(pose.heading_rad))
-    lower_m = pose.y_m - (by_width_m + by_depth_m) / 2
-
-    shown = building.name.replace("_", " ")
-    name = axes.text(
-        pose.x_m, lower_m + 0.6, shown, ha="center", va="bottom", fontsize=6.5, color=NAME
-    )
-    name.set(zorder=6, path_effects=[outlines.withStroke(linewidth=1.8, foreground=HOUSE)])
 
 
 def _draw_barrier(axes: Axes, street: Street) -> None:
