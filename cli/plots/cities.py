@@ -11,6 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from cogmap.cli.plots.palette import (
     ESTIMATE,
@@ -43,53 +44,79 @@ COLOURS = {
     "heading": ESTIMATE,
 }
 MAX_SHEETS = 8
+MANY = 3
+VIEWS = 3
+"""Panels of a map: as it is, as it was learned, and with its loop closed."""
+
 MARGIN_M = 120.0
 SCALE_M = 200.0
 
 
 def figure(maps: Sequence[CityMap], metrics: dict[str, Any]) -> Figure:
-    """Draw the sheet: errors on top; below, true and learned maps, a column each, of at most
-    MAX_SHEETS of them, from the shortest tour to the longest.
+    """Draw the sheet: errors on top; below, true and learned maps of at most MAX_SHEETS of them,
+    from the shortest tour to the longest: a column each if they are MANY, otherwise a row.
     """
     ordered = sorted(maps, key=lambda each: each.environment.tour_m)
     picks = np.linspace(0, len(ordered) - 1, min(MAX_SHEETS, len(ordered))).round().astype(int)
     chosen = [ordered[pick] for pick in np.unique(picks).tolist()]
-    columns = max(2, len(chosen))
+    many = len(chosen) >= MANY
+    rows, columns = (VIEWS, len(chosen)) if many else (len(chosen), VIEWS)
+    with new_sheet(max(11.0, 2.9 * columns), 5.0 + 2.9 * rows, _title(maps, metrics)) as sheet:
+        grid = sheet.add_gridspec(2, 1, height_ratios=(4.0, 2.9 * rows))
+        errors, sizes = sheet.add_subfigure(grid[0]).subplots(1, 2, width_ratios=(2.2, 1))
+        _draw_errors(errors, maps)
+        _draw_growth(sizes, maps, metrics)
 
+        part = sheet.add_subfigure(grid[1])
+        panels = part.subplots(rows, columns, squeeze=False)
+        for views, each in zip(panels.T if many else panels, chosen, strict=True):
+            _draw_maps(views.tolist(), each)
+        part.legend(handles=_legend(), frameon=False, fontsize=8, ncols=4, loc="outside lower left")
+    return sheet
+
+
+def _title(maps: Sequence[CityMap], metrics: dict[str, Any]) -> str:
     traversals = len(maps[0].learned)
-    title = (
-        f"Learned maps of {len(maps)} environments, traversed "
-        f"{'once' if traversals == 1 else f'{traversals} times'} each, {SENSING}.\n"
-        "Corrected over uncorrected error: "
+    each = "once" if traversals == 1 else f"{traversals} times"
+    environments = "an environment" if len(maps) == 1 else f"{len(maps)} environments"
+    return (
+        f"Learned maps of {environments}, traversed {each}{' each' if len(maps) > 1 else ''}, "
+        f"{SENSING}.\nError with the loop closed over that without: "
         f"{metrics['error_corrected_over_uncorrected']:.2f} with headings, "
         f"{metrics['error_positions_over_uncorrected']:.2f} positions only"
     )
-    with new_sheet(max(11.0, 2.9 * columns), 12.5, title) as sheet:
-        grid = sheet.add_gridspec(2, 1, height_ratios=(1, 2.1))
-        errors, sizes = sheet.add_subfigure(grid[0]).subplots(1, 2, width_ratios=(2.2, 1))
-        _draw_errors(errors, maps)
-        length = np.array([each.environment.tour_m / 1e3 for each in maps])
-        for method, name in NAMES.items():
-            error = np.array([each.error_km2(method) for each in maps])
-            slope = metrics[f"growth_{name}_km2_per_km"]
-            sizes.plot(length, error, "o", ms=5, color=COLOURS[method], mec="white")
-            ends = np.array([length.min(), length.max()])
-            sizes.plot(
-                ends,
-                error.mean() + slope * (ends - length.mean()),
-                color=COLOURS[method],
-                label=f"{slope:+.2f}/km",
-            )
-        sizes.set_ylim(bottom=0)
-        sizes.legend(frameon=False, fontsize=8, title="km² for a km of tour", title_fontsize=8)
-        describe(sizes, "b   growth with map size", "tour, km", "km²")
 
-        panels = sheet.add_subfigure(grid[1]).subplots(3, columns, squeeze=False)
-        for column, each in enumerate(chosen):
-            _draw_maps(panels[:, column].tolist(), each)
-        for panel in panels[:, len(chosen) :].ravel():
-            panel.axis("off")
-    return sheet
+
+def _draw_growth(axes: Axes, maps: Sequence[CityMap], metrics: dict[str, Any]) -> None:
+    """Draw the error of each map by the length of its tour and, of several, how it grows."""
+    length_km = np.array([each.environment.tour_m / 1e3 for each in maps])
+    ends_km = np.array([length_km.min(), length_km.max()])
+    for method, name in NAMES.items():
+        error_km2 = np.array([each.error_km2(method) for each in maps])
+        axes.plot(length_km, error_km2, "o", ms=5, color=COLOURS[method], mec="white")
+        if len(maps) > 1:
+            slope = metrics[f"growth_{name}_km2_per_km"]
+            line_km2 = error_km2.mean() + slope * (ends_km - length_km.mean())
+            axes.plot(ends_km, line_km2, color=COLOURS[method], label=f"{slope:+.2f}/km")
+
+    axes.set_ylim(bottom=0)
+    if len(maps) > 1:
+        axes.legend(frameon=False, fontsize=8, title="km² for a km of tour", title_fontsize=8)
+    describe(axes, "b   error by the length of the tour", "tour, km", "km²")
+
+
+def _legend() -> list[Line2D]:
+    """Return the legend of the maps."""
+    square: dict[str, Any] = {"marker": "s", "ls": "", "mec": "white"}
+    return [
+        Line2D([], [], color=TRUE, lw=1.4, label="the tour"),
+        Line2D([], [], color=UNCORRECTED, lw=1.4, label="its path as learned, no loop closed"),
+        Line2D([], [], color=ESTIMATE, lw=1.4, label="its path with loop and headings corrected"),
+        Line2D([], [], color=STREET, lw=1.4, label="other streets"),
+        Line2D([], [], ms=6, color=TRUE, label="building", **square),
+        Line2D([], [], ms=7, color=OBJECT, label="learned building", **square),
+        Line2D([], [], color=OBJECT, lw=0.8, ls="dotted", label="its error"),
+    ]
 
 
 def _draw_errors(axes: Axes, maps: Sequence[CityMap]) -> None:
@@ -139,8 +166,8 @@ def _draw_maps(column: Sequence[Axes], each: CityMap) -> None:
     column[0].plot(*tour.T, color=TRUE, lw=1.4)
     column[0].set_title(f"{_name(each)}, {environment.area_km2:.2f} km²", fontsize=9, color=INK)
     for axes, method, label in (
-        (column[1], "none", "uncorrected"),
-        (column[2], "heading", "corrected"),
+        (column[1], "none", "as learned"),
+        (column[2], "heading", "with loop and headings corrected"),
     ):
         _streets(axes, each)
         axes.plot(*one.road_m[method].T, ".", ms=1.2, color=COLOURS[method], alpha=0.5, zorder=2)

@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from cogmap.cli.plots.palette import (
     ESTIMATE,
@@ -17,13 +18,14 @@ from cogmap.cli.plots.palette import (
     OBJECT,
     POSITIONS,
     ROAD,
-    SEVERAL,
     TRUE,
     UNCORRECTED,
 )
 from cogmap.cli.plots.sheet import describe, new_sheet
 from cogmap.experiments.loop_closing.observer import Loop, Map, Replayed
 from cogmap.experiments.loop_closing.run import SENSING
+
+DASHED = (0, (4, 2))
 
 
 def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
@@ -42,8 +44,9 @@ def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
         _draw_map(after, positions.after, POSITIONS, replayed)
         _draw_shifts(after, positions.before, positions.after)
         _draw_map(end, heading.end, ESTIMATE, "c   in the end, headings corrected too")
-        handles, labels = before.get_legend_handles_labels()
-        above.legend(handles, labels, frameon=False, ncols=4, loc="outside upper left")
+        above.legend(
+            handles=_legend(), frameon=False, fontsize=8.5, ncols=5, loc="outside upper left"
+        )
 
         shifts, synapses = below.subplots(1, 2)
         _draw_replay(shifts, positions.replays[0])
@@ -51,35 +54,48 @@ def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
     return sheet
 
 
+def _legend() -> list[Line2D]:
+    """Return the legend of the maps."""
+    square: dict[str, Any] = {"marker": "s", "ls": ""}
+    point: dict[str, Any] = {"marker": "o", "ls": "", "ms": 8, "mec": "white"}
+    return [
+        Line2D([], [], color=TRUE, lw=1.0, ls=DASHED, label="where the agent was"),
+        Line2D([], [], color=UNCORRECTED, lw=1.8, label="where it believes that it was: before"),
+        Line2D([], [], color=POSITIONS, lw=1.8, label="after the first replay"),
+        Line2D([], [], color=ESTIMATE, lw=1.8, label="in the end"),
+        Line2D([], [], color=FAINT, lw=0.7, label="shifts of places"),
+        Line2D([], [], ms=5, color=TRUE, label="building", **square),
+        Line2D([], [], ms=6, color=OBJECT, label="learned building", **square),
+        Line2D([], [], color=OBJECT, lw=0.8, ls="dotted", label="its error"),
+        Line2D([], [], ms=6, color=ROAD, alpha=0.5, label="learned road", **square),
+        Line2D(
+            [],
+            [],
+            mfc="white",
+            label="start; its end has the path's colour",
+            **point | {"mec": TRUE},
+        ),
+    ]
+
+
 def _draw_map(axes: Axes, drawn: Map, colour: str, title: str) -> None:
-    axes.plot(*drawn.road_m.T, "s", ms=3.0, color=ROAD, alpha=0.4, mew=0, zorder=1, label="road")
-    axes.plot(
-        *drawn.true_path_m.T,
-        color=TRUE,
-        lw=1.0,
-        ls=(0, (4, 2)),
-        zorder=2,
-        label="where the agent was",
-    )
-    axes.plot(
-        *drawn.path_m.T, color=colour, lw=1.8, zorder=3, label="where it believes that it was"
-    )
+    axes.plot(*drawn.road_m.T, "s", ms=3.0, color=ROAD, alpha=0.4, mew=0, zorder=1)
+    axes.plot(*drawn.true_path_m.T, color=TRUE, lw=1.0, ls=DASHED, zorder=2)
+    axes.plot(*drawn.path_m.T, color=colour, lw=1.8, zorder=3)
     lines = np.stack([drawn.true_objects_m, drawn.objects_m], axis=1)
     axes.add_collection(
         LineCollection(list(lines), colors=OBJECT, linewidths=0.8, linestyles="dotted")
     )
     axes.plot(*drawn.true_objects_m.T, "s", ms=4.5, color=TRUE, mec="white", zorder=4)
-    axes.plot(
-        *drawn.objects_m.T, "s", ms=5.5, color=OBJECT, mec="white", zorder=5, label="buildings"
-    )
-    axes.plot(*drawn.path_m[0], "o", ms=8, color=ROAD, mec="white", zorder=6)
+    axes.plot(*drawn.objects_m.T, "s", ms=5.5, color=OBJECT, mec="white", zorder=5)
+    axes.plot(*drawn.path_m[0], "o", ms=8, mfc="white", mec=TRUE, zorder=6)
     axes.plot(*drawn.path_m[-1], "o", ms=8, color=colour, mec="white", zorder=6)
     axes.set_aspect("equal", adjustable="box")
     errors = (
         f"error: path {drawn.path_error_m:.1f} m, buildings {drawn.object_error_m:.1f} m, "
         f"end {drawn.end_error_m:.1f} m"
     )
-    describe(axes, title, errors, "m")
+    describe(axes, f"{title}\n{errors}", "x, m", "y, m")
 
 
 def _draw_shifts(axes: Axes, before: Map, after: Map) -> None:
@@ -93,7 +109,7 @@ def _draw_replay(axes: Axes, replay: Replayed) -> None:
     axes.plot(np.arange(len(replay.shifts_m)), replay.shifts_m, color=POSITIONS, lw=1.8)
     axes.set_ylim(bottom=0)
     title = "d   shift of each place field, in the order of the replay"
-    describe(axes, title, "places, from the one met again backwards", "m")
+    describe(axes, title, "places, from the one met again backwards", "shift, m")
 
 
 def _draw_synapses(axes: Axes, replay: Replayed, metrics: dict[str, Any]) -> None:
@@ -105,7 +121,7 @@ def _draw_synapses(axes: Axes, replay: Replayed, metrics: dict[str, Any]) -> Non
     slope = metrics["strength_change_per_m_close_pairs"]
     r = metrics["strength_and_shift_correlation_close_pairs"]
     axes.axline((0.0, 0.0), slope=slope, color=FAINT, lw=1.0, ls=(0, (4, 2)))
-    axes.plot(nearer, changes, ".", ms=5, color=SEVERAL[4], alpha=0.6)
+    axes.plot(nearer, changes, ".", ms=5, color=POSITIONS, alpha=0.6)
     title = f"e   predicted change of synapses, fields under {1 / replay.decay_per_m:g} m apart"
     describe(
         axes,

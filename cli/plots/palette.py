@@ -36,6 +36,9 @@ SHORTCUT = "#a5d64c"
 SEVERAL = ("#332288", "#cc6677", "#117733", "#999933", "#aa4499", "#44aa99", "#882255", "#5b6475")
 """Things that are told apart by the legend or the names of one plot alone."""
 
+USES = ("#77aadd", "#ee8866", "#eedd88", "#ffaabb", "#99ddff", "#44bb99", "#bbcc33", "#cccccc")
+"""What buildings and places are used for, in the order of a figure's own list."""
+
 UNCORRECTED = SEVERAL[4]
 POSITIONS = SEVERAL[0]
 """Maps as they were learned, and with positions corrected; with headings too, it is ESTIMATE."""

@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 from cogmap.cli.plots.palette import (
     ESTIMATE,
     FAINT,
+    GOAL,
     KERB,
     SEVERAL,
     STREET,
@@ -53,25 +54,34 @@ def figure(human: Sequence[Planned], drawn: Sequence[Planned], metrics: dict[str
     and those of people one by one.
     """
     example = next(problem for problem in drawn if problem.goals == EXAMPLE_GOALS)
-    title = (
-        f"Figure 5 from our own runs, {metrics['participants']:g} simulated participants on "
-        f"each problem of people, {metrics['participants_of_drawn_problems']:g} on the others"
-    )
+    title = "Figure 5 from our own runs, " + _participants(human, metrics)
     with new_sheet(15.0, 10.0, title) as sheet:
         parts: Any = sheet.subfigures(2, 1, height_ratios=(1, 1.35))
         above, below = parts
         free, walled, flat, hierarchical = above.subplots(1, 4)
-        _draw_activation(free, free_ground(), "a   one goal, by activation")
-        _draw_activation(walled, walled_ground(), "b   the same with walls")
+        _draw_activation(free, free_ground(), "a   one goal: activation, from dark to bright")
+        _draw_activation(walled, walled_ground(), "b   the same with walls, grey")
         _draw_tour(flat, example, example.typical_flat, "flat", "c   flat")
         _draw_tour(hierarchical, example, example.typical, "hierarchical", "d   hierarchy")
         _draw_grids(hierarchical, example.positions, TourSettings())
 
-        sizes, people, errors = below.subplots(1, 3)
+        if human:
+            sizes, people, errors = below.subplots(1, 3)
+            _draw_people(people, human)
+            _draw_errors(errors, human, metrics)
+        else:
+            sizes = below.subplots()
         _draw_sizes(sizes, drawn)
-        _draw_people(people, human)
-        _draw_errors(errors, human, metrics)
     return sheet
+
+
+def _participants(human: Sequence[Planned], metrics: dict[str, Any]) -> str:
+    """Tell how many simulated participants planned each problem."""
+    of_drawn = f"{metrics['participants_of_drawn_problems']:g}"
+    if not human:
+        return f"{of_drawn} simulated participants on each problem"
+    of_people = f"{metrics['participants']:g}"
+    return f"{of_people} simulated participants on each problem of people, {of_drawn} on the others"
 
 
 def _draw_activation(axes: Axes, ground: Spread, title: str) -> None:
@@ -80,9 +90,10 @@ def _draw_activation(axes: Axes, ground: Spread, title: str) -> None:
     colours = mpl.colormaps["viridis"].with_extremes(bad=KERB)
     axes.imshow(activation, origin="lower", cmap=colours, interpolation="nearest")
     start, *_, goal = ground.route.tolist()
-    axes.plot(*ground.route.T, color=ESTIMATE, lw=2.0)
-    axes.plot(*start, "s", ms=8, mfc="white", mec=TRUE)
-    axes.plot(*goal, "*", ms=14, color=PUBLISHED, mec="white")
+    axes.plot(*ground.route.T, color=ESTIMATE, lw=2.0, label="route")
+    axes.plot(*start, "s", ls="", ms=8, mfc="white", mec=TRUE, label="start")
+    axes.plot(*goal, "*", ls="", ms=15, mfc=GOAL, mec=TRUE, label="goal")
+    axes.legend(fontsize=8, loc="lower right", framealpha=0.85)
     describe(axes, title)
     remove_scales(axes)
 
@@ -138,7 +149,7 @@ def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
     for values, marker, colour, whose in (
         (drawn_percent, "s", PEOPLE, "people, drawn problems, published"),
         (published.HUMAN_PERCENT, "^", PEOPLE, "people, Madl et al. 2013*"),
-        (published.MODEL_PERCENT, "^", PUBLISHED, "their model*"),
+        (published.MODEL_PERCENT, "D", PUBLISHED, "their model*"),
     ):
         published_sizes = list(values)
         axes.plot(published_sizes, list(values.values()), marker, ms=5, color=colour, label=whose)
@@ -159,10 +170,6 @@ def _draw_sizes(axes: Axes, drawn: Sequence[Planned]) -> None:
 def _draw_people(axes: Axes, human: Sequence[Planned]) -> None:
     """Draw people's quartiles on each problem, the medians of the model and of the flat map."""
     describe(axes, "f   problems that people drew tours of", y="% above the shortest")
-    if not human:
-        _note_absence(axes)
-        return
-
     quartiles = 100 * np.array([problem.people_quartiles for problem in human])
     lows, highs = quartiles.T
     places = np.arange(len(human))
@@ -190,10 +197,6 @@ def _draw_errors(axes: Axes, human: Sequence[Planned], metrics: dict[str, Any]) 
     """Draw the mean excess of the model against that of people, a point for each problem."""
     mean = "mean % above the shortest"
     describe(axes, "g   do they err on the same problems?", f"people, {mean}", f"model, {mean}")
-    if not human:
-        _note_absence(axes)
-        return
-
     people = [100 * problem.people.mean() for problem in human]
     for name, style in PLANS.items():
         ours = [100 * getattr(problem, name).mean() for problem in human]
@@ -209,9 +212,3 @@ def _leave_room(axes: Axes) -> None:
     """Leave room for the legend, above what is drawn."""
     _, top = axes.get_ylim()
     axes.set_ylim(-0.03 * top, 1.45 * top)
-
-
-def _note_absence(axes: Axes) -> None:
-    """Show that there are no people's tours to draw."""
-    remove_scales(axes)
-    axes.text(0.5, 0.5, "no people's tours: see --data", ha="center", color=FAINT)

@@ -9,10 +9,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 from scipy.spatial import ConvexHull, QhullError
 
-from cogmap.cli.plots.palette import FAINT, HOUSE, INK, KERB, PAPER, SEVERAL, STREET, WALL
+from cogmap.cli.plots.palette import FAINT, INK, KERB, PAPER, SEVERAL, STREET, USES, WALL
 from cogmap.cli.plots.sheet import new_sheet
 from cogmap.experiments.map_structure.functions import FUNCTIONS
 from cogmap.experiments.map_structure.measure import Structured
@@ -30,7 +31,8 @@ def figure(found: Sequence[Structured]) -> Figure:
     """Draw the sheet: a map of each city, and beside it the functions of its sub-maps."""
     rows = -(-len(found) // COLUMNS)
     columns = min(COLUMNS, len(found))
-    with new_sheet(1.4 * PANEL_INCHES * columns, PANEL_INCHES * rows) as sheet:
+    title = "Sub-maps of cities, and what their objects are used for"
+    with new_sheet(1.4 * PANEL_INCHES * columns, PANEL_INCHES * rows, title) as sheet:
         parts: Any = sheet.subfigures(rows, columns, squeeze=False)
         for part, each in zip(parts.ravel(), found, strict=False):
             town, mixes = part.subplots(1, 2, width_ratios=(3, 1))
@@ -71,6 +73,16 @@ def _draw_city(axes: Axes, found: Structured) -> None:
     name = city.name.replace("_", " ")
     title = f"{name}: {found.count} sub-maps of {len(city.positions_m)} objects"
     axes.set_title(title, loc="left", fontsize=11, color=INK)
+    lines = [
+        Line2D([], [], color=STREET, lw=2.0, label="street"),
+        Line2D([], [], color=WALL, lw=1.4, label="boundary: railway, water, wall or main road"),
+        Line2D(
+            [], [], color=INK, ls="", marker="o", ms=2.6, label="object, in its sub-map's colour"
+        ),
+    ]
+    axes.legend(
+        handles=lines, frameon=False, fontsize=8, ncols=3, loc="upper left", bbox_to_anchor=(0, 0)
+    )
 
 
 def _draw_sub_map(axes: Axes, members_m: Floats, label: int) -> None:
@@ -110,8 +122,10 @@ def _draw_functions(axes: Axes, found: Structured) -> None:
         wanted = code if code < len(FUNCTIONS) else -1
         is_wanted = found.city.functions == wanted
         counts = np.array([int((is_wanted & (found.labels == label)).sum()) for label in labels])
-        colour = SEVERAL[code % len(SEVERAL)] if wanted >= 0 else HOUSE
-        axes.barh(places, counts, 0.75, left=left, color=colour, label=name)
+        if not counts.any():
+            continue
+
+        axes.barh(places, counts, 0.75, left=left, color=USES[code], label=name)
         left += counts
 
     axes.set_yticks(places, [str(label + 1) for label in labels.tolist()], fontsize=8)
@@ -122,7 +136,8 @@ def _draw_functions(axes: Axes, found: Structured) -> None:
     for side in ("top", "right"):
         axes.spines[side].set_visible(False)
     axes.spines["left"].set_color(KERB)
-    axes.legend(frameon=False, fontsize=8, loc="lower right")
+    axes.set_ylabel("sub-map, the largest first", color=FAINT)
+    axes.legend(frameon=False, fontsize=8, ncols=2, loc="lower left", bbox_to_anchor=(0.0, 1.0))
 
 
 def _by_size(labels: Indices) -> Indices:
