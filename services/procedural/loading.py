@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
+from cogmap.data.toml_tables import Source, read_tables
 from cogmap.errors import ConfigError
 from cogmap.hints import did_you_mean
 from cogmap.schemas.base import Count, Finite, Name, PositiveSeconds, Scalar, Share
@@ -18,9 +18,10 @@ from cogmap.schemas.feelings import Feeling
 from cogmap.services.procedural.kinds import NEED, NodeKinds
 from cogmap.services.procedural.patterns import Condition, Pattern
 from cogmap.services.procedural.schemes import Reference, Result, Scheme
-from cogmap.services.procedural.source import GUIDANCE, Source
 
 BUILT_IN = Path(__file__).with_name("schemes.toml")
+SCHEME = "scheme"
+GUIDANCE = "guidance"
 KIND = "kind"
 VARIABLE = "as"
 FEELING = "feeling"
@@ -83,7 +84,8 @@ def load(path: Path) -> list[Scheme]:
     for number, table in enumerate(file.scheme):
         scheme = _Reader(source, number, table, kinds).scheme(actions)
         if scheme.name in [each.name for each in schemes]:
-            raise source.error(number, scheme.name, f"two schemes are named {scheme.name!r}")
+            text = f"two schemes are named {scheme.name!r}"
+            raise source.error(SCHEME, number, scheme.name, text)
         schemes.append(scheme)
 
     return schemes
@@ -97,49 +99,24 @@ def load_guidance(path: Path) -> list[GuidanceScheme]:
     for number, table in enumerate(file.guidance):
         if table.name in names:
             text = f"two schemes are named {table.name!r}"
-            raise source.error(number, table.name, text, table=GUIDANCE)
+            raise source.error(GUIDANCE, number, table.name, text)
         if table.successes > table.executions:
             text = f"scheme {table.name!r} has more successes than executions"
-            raise source.error(number, "successes", text, table=GUIDANCE)
+            raise source.error(GUIDANCE, number, "successes", text)
 
         names.add(table.name)
         try:
             schemes.append(msgspec.convert(msgspec.to_builtins(table), GuidanceScheme))
         except msgspec.ValidationError as error:
             word = str(error).rpartition("$.")[2].rstrip("`")
-            raise source.error(number, word, str(error), table=GUIDANCE) from None
+            raise source.error(GUIDANCE, number, word, str(error)) from None
 
     return schemes
 
 
 def _decoded(path: Path) -> tuple[Source, SchemeFile]:
-    try:
-        text = path.read_text()
-    except FileNotFoundError:
-        raise ConfigError(
-            f"no file of schemes {path}: name one that exists, or leave procedural.schemes out"
-        ) from None
-    except (UnicodeDecodeError, OSError) as error:
-        raise ConfigError(f"cannot read {path} as TOML: {error}") from None
-
-    source = Source(path, text)
-    try:
-        return source, msgspec.convert(tomllib.loads(text), SchemeFile)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"cannot read {path} as TOML: {error}") from None
-    except msgspec.ValidationError as error:
-        raise _located(source, str(error)) from None
-
-
-def _located(source: Source, error: str) -> ConfigError:
-    """Locate an error of the decoder, which names its place by a path such as $.scheme[1].name."""
-    place = re.search(r"\$\.(\w+)\[(\d+)\]", error)
-    words = re.findall(r"\w+", error.rpartition("$")[2]) or [""]
-    unknown = re.search(r"unknown field `(\w+)`", error)
-    word = unknown[1] if unknown else words[-1]
-    if place is None:
-        return source.error(None, word, error)
-    return source.error(int(place[2]), word, error, table=place[1])
+    remedy = "name one that exists, or leave procedural.schemes out"
+    return read_tables(path, SchemeFile, "file of schemes", remedy)
 
 
 class _Reader:
@@ -307,4 +284,4 @@ class _Reader:
 
     def _error(self, word: str, text: str) -> ConfigError:
         text = f"scheme {self._table.name!r} {text}"
-        return self._source.error(self._number, word, text, self._near)
+        return self._source.error(SCHEME, self._number, word, text, self._near)
