@@ -53,6 +53,7 @@ VERBS = {
     "teleop": ("cogmap.cli.teleop:teleop", "Drive the robot by keys, in the place of motor."),
     "time": ("cogmap.cli.pausing:time_", "Let simulated time stand, go on by views, and pass."),
     "topic": ("cogmap.cli.topic.command:topic", "Watch topics of a running system; publish."),
+    "town": ("cogmap.cli.town.command:town", "Write a town of your own, and draw any town."),
     "train": ("cogmap.training.command:train", "Train the networks of perception."),
     "view": ("cogmap.cli.view.command:view", "Show a running system in Foxglove or Rerun."),
 }

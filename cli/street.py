@@ -45,13 +45,14 @@ def list_(as_json: bool, connect: str, agent: str) -> None:
     """List the streets of the town, and those that are closed."""
     with observing(connect, agent, "street") as bus:
         town = Towns(bus).next(ANSWER_S)
+    closed = {street.name: street.closed for street in town.streets}
     if as_json:
-        closed = {street.name: street.closed for street in town.streets}
         print_json(closed)
         return
 
-    for street in town.streets:
-        click.echo(f"{street.name}{': closed' if street.closed else ''}")
+    # A street that bends is listed once.
+    for name, is_closed in closed.items():
+        click.echo(f"{name}{': closed' if is_closed else ''}")
 
 
 @street.command()

@@ -21,7 +21,7 @@ from cogmap.schemas.nodes import Goal, goal_id
 from cogmap.services import registry
 from cogmap.services.sim.config import Config as SimConfig
 from cogmap.services.sim.layout.town import generate
-from cogmap.services.sim.layout.towns import BLOCKS, LOOP
+from cogmap.services.sim.layout.towns import BLOCKS, LOOP, is_written
 from cogmap.services.sim.odometry import FUSED
 
 OBSERVER = "observer"
@@ -159,7 +159,7 @@ def _give_goals(sections: Sections, choices: Choices) -> None:
     """Give the agent its goals, if there are any; the drive ends when they are reached.
 
     These are the goals that are chosen, after exploring else home; else those that are set, else
-    the corners of the loop.
+    those of a town that somebody has written, or the corners of the loop.
     """
     sim = sections["sim"]
     workspace = sections["workspace"]
@@ -174,6 +174,8 @@ def _give_goals(sections: Sections, choices: Choices) -> None:
             {"name": name_of(goal.id), "object": goal.object, "x_m": goal.x_m, "y_m": goal.y_m}
             for goal in goals
         ]
+    elif "goals" not in workspace and is_written(sim.get("town", LOOP)):
+        workspace["goals"] = _written_goals(Path(sim["town"]))
     elif "goals" not in workspace and sim.get("town", LOOP) == LOOP:
         laps = choices.laps or 1.0
         *corners, end = generate(sim.get("seed", SimConfig().seed)).goals(laps)
@@ -187,6 +189,21 @@ def _give_goals(sections: Sections, choices: Choices) -> None:
 
     if workspace.get("goals"):
         sim.setdefault("ends_at_goal", True)
+
+
+def _written_goals(path: Path) -> list[dict[str, Any]]:
+    """Return the goals of a town that somebody has written. Raises ConfigError.
+
+    The agent has to find a building itself: it is given the name alone.
+    """
+    from cogmap.services.sim.layout.written import town as written  # few drive there
+
+    return [
+        {"name": goal.name, "object": goal.building}
+        if goal.building
+        else {"name": goal.name, "x_m": goal.x_m, "y_m": goal.y_m}
+        for goal in written.read(path).goals
+    ]
 
 
 def participants(choices: Choices, observer: bool) -> dict[str, int]:

@@ -17,7 +17,7 @@ SIM = "sim"
 
 def check_inputs(sections: Sections, choices: Choices) -> None:
     """Raise the CogmapError with which a module of the drive would end as it starts, for its file
-    of schemes, the settings of the simulation, the extract of its town, or the database of
+    of schemes, the settings of the simulation, the file of its town, or the database of
     long-term memory; a recording is opened before. Inputs of modules that somebody else starts are
     not checked.
     """
@@ -27,7 +27,7 @@ def check_inputs(sections: Sections, choices: Choices) -> None:
     if SIM in choices.modules and SIM not in choices.without:
         settings = config.typed(sections, SIM, Config)
         check(settings, config.typed(sections, SECTION, Run))
-        if settings.town.startswith(towns.OSM):  # one from a seed takes seconds, and cannot fail
+        if towns.is_file(settings.town):  # one from a seed takes seconds, and cannot fail
             towns.place(settings.town, settings.seed, settings.town_size_m)
 
     memory = choices.memory

@@ -19,7 +19,7 @@ seed_option = click.option(
 )
 
 
-def _known_town(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
+def known_town(context: click.Context, option: click.Parameter, value: str | None) -> str | None:
     """Refuse a town that does not exist. Raises ConfigError."""
     if value is not None:
         from cogmap.services.sim.layout import towns
@@ -31,8 +31,9 @@ def _known_town(context: click.Context, option: click.Parameter, value: str | No
 town_option = click.option(
     "--town",
     metavar="TOWN",
-    callback=_known_town,
-    help="The town: loop, blocks, or osm:FILE for an OpenStreetMap extract.  [default: loop]",
+    callback=known_town,
+    help="The town: loop, blocks, osm:FILE for an OpenStreetMap extract, or FILE.toml for one of "
+    "your own (cogmap town).  [default: loop]",
 )
 tour_option = click.option(
     "--tour",

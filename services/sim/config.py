@@ -61,7 +61,8 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         str,
         msgspec.Meta(
             description="loop: a loop of streets. blocks: several blocks, with districts. "
-            "osm:FILE: the streets and buildings of an OpenStreetMap extract.",
+            "osm:FILE: the streets and buildings of an OpenStreetMap extract. "
+            "FILE.toml: a town of your own.",
         ),
     ] = "loop"
     town_size_m: Annotated[

@@ -15,6 +15,7 @@ from cogmap.cli.launch.individuals.buildings import NOTHING
 from cogmap.cli.launch.individuals.judge import Judgement
 from cogmap.cli.launch.observer import Observer
 from cogmap.cli.plots.map.frame import Transform
+from cogmap.cli.plots.map.markers import END_MARKER, START_MARKER
 from cogmap.cli.plots.map.town import Handle
 from cogmap.cli.plots.palette import ESTIMATE, FUSED, OBJECT, ROAD, ROAD_OPACITY, TRUE, WHEELS
 from cogmap.geometry.arrays import Floats
@@ -44,12 +45,12 @@ def draw_true_path(axes: Axes, observer: Observer) -> list[Handle]:
 
     path_m = observer.to_map(observer.true_path_m)
     axes.plot(*path_m.T, color=TRUE, lw=3.2, alpha=0.9, solid_capstyle="round", zorder=9)
-    axes.plot(*start, "o", ms=14, mfc="white", mec=TRUE, mew=2, zorder=11)
-    axes.plot(*path_m[-1], "s", ms=8, mfc=TRUE, mec="white", mew=1.2, zorder=11)
+    axes.plot(*start, **START_MARKER, zorder=11)
+    axes.plot(*path_m[-1], **END_MARKER, zorder=11)
     return [
         Line2D([], [], color=TRUE, lw=3.2, label="true path"),
-        Line2D([], [], marker="o", ls="", ms=10, mfc="white", mec=TRUE, mew=2, label="start"),
-        Line2D([], [], marker="s", ls="", ms=8, mfc=TRUE, mec="white", label="end"),
+        Line2D([], [], label="start", **START_MARKER),
+        Line2D([], [], label="end", **END_MARKER),
     ]
 
 

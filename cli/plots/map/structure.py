@@ -11,8 +11,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
 from cogmap.cli.launch.observer import Observer
+from cogmap.cli.plots.map.markers import goal_marker
 from cogmap.cli.plots.map.town import Handle
-from cogmap.cli.plots.palette import CUT, GOAL, INK, PLAN, SHORTCUT, SUB_MAP
+from cogmap.cli.plots.palette import CUT, PLAN, SHORTCUT, SUB_MAP
 from cogmap.geometry.hulls import hull_m
 from cogmap.geometry.se2 import transform_from
 from cogmap.graph.cuts import cut_links_m
@@ -102,9 +103,9 @@ def _draw_goals(axes: Axes, graph: Graph) -> list[Handle]:
     for goal, position_m in goals_m(graph):
         is_reached = goal.reached_ns != NEVER_NS
         label = "goal, reached" if is_reached else "goal, not reached"
-        style: dict[str, Any] = {"mfc": GOAL if is_reached else "white", "mec": INK, "mew": 1.0}
-        axes.plot(*position_m, "*", ms=15, zorder=12, **style)
-        legend[label] = Line2D([], [], marker="*", ms=12, ls="", label=label, **style)
+        marker = goal_marker(is_reached)
+        axes.plot(*position_m, zorder=12, **marker)
+        legend[label] = Line2D([], [], label=label, **marker)
 
     return list(legend.values())
 

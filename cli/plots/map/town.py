@@ -13,12 +13,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon, Rectangle
 from matplotlib.transforms import Affine2D
 
-from cogmap.cli.plots.palette import CHARGING, CLOSED, DISTRICTS, HOUSE, KERB, STREET, WALL
+from cogmap.cli.plots.map.markers import CHARGING_MARKER
+from cogmap.cli.plots.palette import CLOSED, DISTRICTS, HOUSE, KERB, STREET, WALL
 from cogmap.schemas.sensing import Building, Obstacle, Street, TrueTown
 from cogmap.services.sim.layout.furniture import CHARGING_PLACE
 
-# A plus, filled.
-CHARGING_MARKER: dict[str, Any] = {"marker": "P", "ms": 9, "ls": "", "color": CHARGING}
 Handle = Patch | Line2D
 """A sample in a legend."""
 

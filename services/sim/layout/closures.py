@@ -8,6 +8,7 @@ from typing import Annotated
 import msgspec
 
 from cogmap.errors import ConfigError, MessageError
+from cogmap.hints import did_you_mean
 from cogmap.schemas.base import Name
 from cogmap.schemas.sensing import StreetClosure
 from cogmap.services.sim.layout.plan import Road
@@ -36,9 +37,7 @@ class ClosedStreets:
         self._names = frozenset(road.name for road in roads)
         for closure in schedule:
             if closure.street not in self._names:
-                raise ConfigError(
-                    f"[sim] closures: {self._unknown(closure.street)}: name one of this town's"
-                )
+                raise ConfigError(f"[sim] closures: {self._unknown(closure.street)}")
 
         self._changes = _changes(schedule)
         self._closed: set[str] = set()
@@ -78,8 +77,9 @@ class ClosedStreets:
             self._closed.discard(street)
 
     def _unknown(self, street: str) -> str:
-        names = ", ".join(sorted(self._names))
-        return f"there is no street {street!r} in the town, which has {names}"
+        names = sorted(self._names)
+        meant = did_you_mean(street, names, f"name one of {', '.join(names)}")
+        return f"there is no street {street!r} in the town: {meant}"
 
 
 def _changes(schedule: Iterable[Closure]) -> list[tuple[float, str, bool]]:

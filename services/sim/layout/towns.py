@@ -1,4 +1,4 @@
-"""The towns that there are to drive in. Pure, but for the extract that one is read from."""
+"""The towns that there are to drive in. Pure, but for the files that some are read from."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from cogmap.errors import ConfigError
 from cogmap.services.sim.layout.blocks import town as blocks
 from cogmap.services.sim.layout.charging import with_charging_places
+from cogmap.services.sim.layout.furniture import CHARGING_PLACE
 from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.starts import another_start
 from cogmap.services.sim.layout.town import generate
@@ -15,16 +16,29 @@ from cogmap.services.sim.layout.town import generate
 LOOP = "loop"
 BLOCKS = "blocks"
 OSM = "osm:"
+WRITTEN = ".toml"
 
 
 def check(town: str) -> None:
-    """Raise ConfigError if there is no town of that name: LOOP, BLOCKS, or OSM and a path."""
-    is_extract = town.startswith(OSM) and town != OSM
-    if not is_extract and town not in (LOOP, BLOCKS):
+    """Raise ConfigError if there is no town of that name: LOOP, BLOCKS, OSM and a path, or a path
+    that ends in WRITTEN.
+    """
+    if not is_file(town) and town not in (LOOP, BLOCKS):
         raise ConfigError(
-            f"there is no town {town!r}: choose {LOOP}, {BLOCKS} or {OSM}FILE, the path of an "
-            "OpenStreetMap extract"
+            f"there is no town {town!r}: choose {LOOP}, {BLOCKS}, {OSM}FILE, the path of an "
+            f"OpenStreetMap extract, or FILE{WRITTEN}, a town of your own"
         )
+
+
+def is_file(town: str) -> bool:
+    """Decide whether a town is read from a file."""
+    is_extract = town.startswith(OSM) and town != OSM
+    return is_extract or is_written(town)
+
+
+def is_written(town: str) -> bool:
+    """Decide whether a town is one that somebody has written, rather than an extract."""
+    return town.endswith(WRITTEN) and not town.startswith(OSM)
 
 
 def place(
@@ -32,24 +46,41 @@ def place(
 ) -> Place:
     """Make the town of that name, with so many charging places.
 
-    It is LOOP or BLOCKS, from `seed`, or OSM and the path of an extract; `size_m` is the side of a
-    town of blocks. The robot begins where it usually does, or at another `start`, numbered from 1.
-    Raises UsageError if the extract makes no town, or the town has no room for so many charging
-    places.
+    It is LOOP or BLOCKS, from `seed`, OSM and the path of an extract, or the path of a town that
+    somebody has written, which keeps its own charging places if there are to be any; `size_m` is
+    the side of a town of blocks. The robot begins where it usually does, or at another `start`,
+    numbered from 1. Raises UsageError if the file makes no town, or the town has no room for so
+    many charging places.
     """
-    made = with_charging_places(_bare(town, seed, size_m), seed, charging_places)
+    made = _charging(_bare(town, seed, size_m), seed, charging_places)
     if not start:
         return made
     return dataclasses.replace(made, start=another_start(made, start))
 
 
+def _charging(bare: Place, seed: int, count: int) -> Place:
+    """Return the place with charging places: with its own, if it has some, else with `count`."""
+    if not bare.charging_places:
+        return with_charging_places(bare, seed, count)
+    if count:
+        return bare
+
+    props = tuple(prop for prop in bare.props if prop.kind != CHARGING_PLACE)
+    return dataclasses.replace(bare, props=props)
+
+
 def _bare(town: str, seed: int, size_m: float) -> Place:
     if town == LOOP:
         return generate(seed)
+    # What reads files takes as long to import as all the rest, and few drive there.
     if town.startswith(OSM):
-        # It takes as long to import as all the rest, and few drive there.
         from cogmap.services.sim.layout.osm import town as osm
 
         return osm.read(Path(town.removeprefix(OSM)))
+
+    if is_written(town):
+        from cogmap.services.sim.layout.written import town as written
+
+        return written.read(Path(town))
 
     return blocks.generate(seed, size_m)

@@ -354,9 +354,17 @@ def test_a_closure_of_a_street_that_is_not_there_is_refused() -> None:
         build(_config(closures=[closure]), run=LOCKSTEP)
 
 
+def test_a_closure_of_a_street_that_was_misspelt_names_the_one_that_was_meant() -> None:
+    name = TOWN.roads[0].name
+    closure = Closure(street=name.lower(), from_s=0.0)
+
+    with pytest.raises(ConfigError, match=f"did you mean {name!r}"):
+        build(_config(closures=[closure]), run=LOCKSTEP)
+
+
 @pytest.mark.parametrize("town", ["village", "osm:", ""])
 def test_a_town_that_there_is_none_of_is_refused(town: str) -> None:
-    with pytest.raises(ConfigError, match="choose loop, blocks or osm:FILE"):
+    with pytest.raises(ConfigError, match=r"choose loop, blocks, osm:FILE.*or FILE\.toml"):
         build(Config(town=town))
 
 

@@ -4,16 +4,14 @@ Pure.
 
 from __future__ import annotations
 
-import colorsys
 import math
-import zlib
 
 import cv2
 import numpy as np
 
 from cogmap.data.osm import Extract, Tags, Way
 from cogmap.geometry.arrays import Floats
-from cogmap.services.sim.layout.catalogue import BuildingType, Colour
+from cogmap.services.sim.layout.looks import drawn_from_name
 from cogmap.services.sim.layout.osm.streets import Positions, metres
 from cogmap.services.sim.layout.plan import Plot
 
@@ -29,9 +27,6 @@ CORNERS = 3
 # As long as a name in a message may be (schemas/base.py).
 MAX_NAME = 200
 NO_WALLS = ("no", "roof", "carport")
-_TRIM: Colour = (240, 238, 232)
-_ROOF: Colour = (110, 100, 96)
-_PATTERNS = ("", "bands", "stripes", "columns", "grid", "timber")
 # What a building is used for, by the values of its tags.
 _FUNCTIONS = {
     "school": ("school", "university", "college", "kindergarten", "library", "museum", "theatre"),
@@ -93,23 +88,9 @@ def _plot(name: str, tags: Tags, outline_m: Floats) -> Plot:
     middle_m, size_m, degrees = cv2.minAreaRect(outline_m.astype(np.float32))
     x_m, y_m = middle_m
     length_m, width_m = size_m
-    rng = np.random.default_rng(zlib.crc32(name.encode()))
-    hue = float(rng.random())
-
-    kind = BuildingType(
-        name=name,
-        width_m=round(float(length_m), 2),
-        depth_m=round(float(width_m), 2),
-        height_m=round(height_m(tags), 2),
-        wall=_paint(hue, 0.35, 0.85),
-        accent=_paint((hue + 0.4) % 1.0, 0.5, 0.45),
-        trim=_TRIM,
-        door=_paint((hue + 0.7) % 1.0, 0.5, 0.4),
-        roof=_ROOF,
-        pattern=str(rng.choice(_PATTERNS)),
-    )
+    rounded_m = (round(float(length_m), 2), round(float(width_m), 2), round(height_m(tags), 2))
     return Plot(
-        kind=kind,
+        kind=drawn_from_name(name, rounded_m),
         x_m=round(float(x_m), 2),
         y_m=round(float(y_m), 2),
         heading_rad=math.remainder(math.radians(degrees), math.tau),
@@ -139,8 +120,3 @@ def function(tags: Tags) -> str:
             return name
 
     return "home"
-
-
-def _paint(hue: float, saturation: float, value: float) -> Colour:
-    red, green, blue = (round(255 * share) for share in colorsys.hsv_to_rgb(hue, saturation, value))
-    return red, green, blue
