@@ -51,7 +51,7 @@ VERBS = {
     "street": ("cogmap.cli.street:street", "List, close and open streets of the town."),
     "sweep": ("cogmap.cli.sweep.command:sweep_command", "Drive with many seeds and settings."),
     "teleop": ("cogmap.cli.teleop:teleop", "Drive the robot by keys, in the place of motor."),
-    "time": ("cogmap.cli.pausing:time_", "Let simulated time stand, go on by views, and pass."),
+    "time": ("cogmap.cli.pausing:time_", "Let simulated time stand and pass; begin again."),
     "topic": ("cogmap.cli.topic.command:topic", "Watch topics of a running system; publish."),
     "town": ("cogmap.cli.town.command:town", "Write a town of your own, and draw any town."),
     "train": ("cogmap.training.command:train", "Train the networks of perception."),

@@ -1,4 +1,4 @@
-"""`cogmap time`: lets the time of a simulation or a recording stand and pass."""
+"""`cogmap time`: lets simulated time stand and pass, and the robot begin where it began."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.program import agent_option, connect_option
 from cogmap.schemas import topics
 from cogmap.schemas.process import Pause, Paused
+from cogmap.schemas.sensing import Reset, TruePose
 
 ANSWER_S = 10.0
 """Time for an answer; on a busy machine it takes a few seconds."""
@@ -27,7 +28,8 @@ TRY_S = 1.0
 def time_() -> None:
     """Let the time of the simulation stand and pass, or that of the recording that is played.
 
-    While it stands, nothing is sensed and the robot does not move.
+    While it stands, nothing is sensed and the robot does not move. `reset` carries the robot of a
+    simulation back to its start.
     """
 
 
@@ -62,6 +64,56 @@ def step(views: int, connect: str, agent: str) -> None:
         ask(bus, Pause(is_paused=True), ANSWER_S)
         ask(bus, Pause(is_paused=True, views=views), ANSWER_S, try_s=ANSWER_S)
     click.echo(f"views to come: {views}; then time stands")
+
+
+@time_.command()
+@connect_option
+@agent_option
+def reset(connect: str, agent: str) -> None:
+    """Carry the robot of a simulation back to its start.
+
+    Time goes on, and the agent keeps what it knows. Nothing tells it of this but its senses.
+    """
+    with observing(connect, agent, "time") as bus:
+        times = carry(bus, ANSWER_S)
+    click.echo(f"the robot is at its start again; so often by now: {times}")
+
+
+def carry(bus: Bus, timeout_s: float) -> int:
+    """Let the robot be carried back to its start; return how often it was by then. Raises
+    NoAnswerError if no simulation says within `timeout_s` that it is there.
+    """
+    inbox = Inbox()
+    intake = Intake()
+    bus.subscribe(topics.TRUE_POSE, inbox.put, intake.count_lost)
+    # While time stands no pose comes, and none is on its way.
+    known = max(0, _resets(inbox, intake, TRY_S, least=0))
+    publisher = Publisher(bus, topics.RESET)
+    until_s = time.monotonic() + timeout_s
+    while time.monotonic() < until_s:
+        publisher.publish(Reset())
+        newest = _resets(inbox, intake, min(TRY_S, timeout_s), least=known + 1)
+        if newest > known:
+            return newest
+
+    raise NoAnswerError(
+        f"no simulation carried its robot back within {timeout_s:g} s: start one with "
+        "`cogmap run`; a recording and a trajectory have no way back"
+    )
+
+
+def _resets(inbox: Inbox, intake: Intake, timeout_s: float, least: int) -> int:
+    """Wait for a true pose after `least` resets; return how many there were by the newest one, -1
+    if there came none.
+    """
+    newest = -1
+    until_s = time.monotonic() + timeout_s
+    while newest < least and (left_s := until_s - time.monotonic()) > 0:
+        arrival = inbox.take(left_s)
+        pose = intake.accept(arrival) if isinstance(arrival, Arrival) else None
+        if isinstance(pose, TruePose):
+            newest = pose.resets or 0
+    return newest
 
 
 def ask(bus: Bus, pause: Pause, timeout_s: float, try_s: float = TRY_S) -> None:

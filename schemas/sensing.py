@@ -289,10 +289,15 @@ class StreetClosure(Message, kw_only=True, frozen=True):
     closed: bool
 
 
+class Reset(Message, kw_only=True, frozen=True):
+    """Asks that the robot is carried back to where it began. People publish it."""
+
+
 class TruePose(Message, kw_only=True, frozen=True):
     """Where the robot really is, and how often it has run into something. Observers only.
 
-    `energy` is the level of its battery, absent where it has none.
+    `energy` is the level of its battery, absent where it has none. `resets` is how often it was
+    carried back to where it began, absent before the first time.
     """
 
     pose: Pose
@@ -300,6 +305,7 @@ class TruePose(Message, kw_only=True, frozen=True):
     progress: Unit
     collisions: Count = 0
     energy: Unit | msgspec.UnsetType = msgspec.UNSET
+    resets: Count | msgspec.UnsetType = msgspec.UNSET
 
 
 class Street(Part, kw_only=True, frozen=True):

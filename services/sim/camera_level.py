@@ -49,7 +49,8 @@ class PhysicalRobot:
 
     def resume(self, last: TruePose) -> None:
         """Continue at the last true pose, at rest."""
-        self._world.robot.place(last.pose)
+        self._world.place_robot(last.pose)
+        self._world.robot.drive(0.0, 0.0)
         self._world.collisions = last.collisions
         self.pose = self._world.pose()
         self.travelled_m = last.travelled_m

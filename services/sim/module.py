@@ -55,6 +55,7 @@ def build(config: Config, instance: str = "sim", run: Run = REAL_TIME) -> Module
 
     if trajectory is None:
         module.on(topics.STREET_CLOSURE, simulation.closed_streets.on_closure)
+        module.on(topics.RESET, simulation.on_reset, [topics.TRUE_POSE])
         module.journaling(topics.TRUE_POSE, simulation.resume, simulation.truth)
 
     # Time begins when these are ready: at least the simulation itself.

@@ -9,7 +9,14 @@ import msgspec
 
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock
-from cogmap.schemas.sensing import MotorCommand, Pose, SpeedLimit, TruePose, TrueTown
+from cogmap.schemas.sensing import (
+    MotorCommand,
+    Pose,
+    Reset,
+    SpeedLimit,
+    TruePose,
+    TrueTown,
+)
 from cogmap.services.sim.battery import Battery, PowerSupply
 from cogmap.services.sim.config import Config
 from cogmap.services.sim.layout.closures import ClosedStreets
@@ -93,7 +100,10 @@ class Simulation:
         self.closed_streets = ClosedStreets((), ())
         self._removed = RemovedBuildings(0, ())
         self._power = PowerSupply(None, ())
+        self._start = driver.pose
+        self._resets = 0
         if place is not None:
+            self._start = place.start
             self.closed_streets = ClosedStreets(place.roads, config.closures)
             self._removed = RemovedBuildings(len(place.plots), config.removals)
             self._power = PowerSupply(battery, place.charging_places_m)
@@ -117,8 +127,17 @@ class Simulation:
         self.driver.resume(last)
         self._is_over = last.progress >= 1.0
         self._power.resume(last.energy)
+        self._resets = last.resets or 0
         self.now_ns = last.stamp_ns
         self._frames = self.now_ns // self.tick_ns // self.ticks_per_frame
+
+    def on_reset(self, _reset: Reset) -> list[Message]:
+        """Carry the robot back to where it began, at rest; return its pose there. Time goes on, and
+        the robot senses nothing of the way.
+        """
+        self._resets += 1
+        self.driver.resume(msgspec.structs.replace(self.truth(), pose=self._start))
+        return [self.truth()]
 
     def drive(self, command: MotorCommand) -> None:
         """Set the wheels' speeds if there is energy. A drive that ends at its goal is over once a
@@ -174,6 +193,7 @@ class Simulation:
             progress=share,
             collisions=self.driver.collisions,
             energy=self._power.level,
+            resets=self._resets or msgspec.UNSET,
         )
 
     def town(self) -> TrueTown:

@@ -21,7 +21,9 @@ PERCEPTS = (
 )
 
 
-def test_a_drive_stands_goes_on_by_views_and_goes_on(start: Callable[..., Run]) -> None:
+def test_a_drive_stands_goes_on_by_views_and_from_its_start_and_goes_on(
+    start: Callable[..., Run],
+) -> None:
     run = start(*PERCEPTS)
     run.wait_for(DRIVING)
     frames: list[int] = []
@@ -35,11 +37,13 @@ def test_a_drive_stands_goes_on_by_views_and_goes_on(start: Callable[..., Run]) 
     bus.subscribe(topics.PERCEPTS, receive, lambda _topic, _number: None)
 
     assert "time stands" in answered("time", run.endpoint, "pause").stdout
+    assert "so often by now: 1" in answered("time", run.endpoint, "reset").stdout
     before = len(frames)
     assert "views to come: 3" in answered("time", run.endpoint, "step", "3").stdout
     wait_until(lambda: len(frames) == before + 3, "three views have come")
     assert "time passes" in answered("time", run.endpoint, "resume").stdout
     wait_until(lambda: len(frames) > before + 10, "views come again")
+    assert "so often by now: " in answered("time", run.endpoint, "reset").stdout
     bus.close()
     run.close()
 

@@ -43,6 +43,9 @@ class KinematicRobot:
         self.pose = last.pose
         self.collisions = last.collisions
         self.travelled_m = last.travelled_m
+        self._wheels_rad_s = (0.0, 0.0)
+        self._wanted_rad_s = (0.0, 0.0)
+        self._is_touching = False
 
     def drive(self, command: MotorCommand) -> None:
         """Obey a command from now on."""
