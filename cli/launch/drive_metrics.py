@@ -145,10 +145,11 @@ class DriveMetrics(msgspec.Struct, kw_only=True):
 
 class RecordedMetrics(DriveMetrics, kw_only=True):
     """What the log of a drive shows: its drive, its settings, and the recording; None where there
-    is none, or it was not finished.
+    is none, or it was not finished. `town` is that of the settings, by its name or its file.
     """
 
     completed: bool
+    town: str
     seed: int
     lockstep: bool
     log: Recording | None

@@ -112,13 +112,14 @@ def _followed(reader: LogReader) -> tuple[RecordedMetrics, Tally]:
         )
 
     recorded = recorded_config(reader)
-    seed = recorded.get("sim", {}).get("seed", SimConfig().seed)
+    sim = recorded.get("sim", {})
     lockstep = recorded.get(SECTION, {}).get("lockstep", Run().lockstep)
     metrics = drive_metrics(tally, tally.gaps(intake.gaps), tally.rejected(intake.rejected))
     of_log = RecordedMetrics(
         **msgspec.structs.asdict(metrics),
         completed=metrics.progress >= 1.0,
-        seed=int(seed),
+        town=str(sim.get("town", SimConfig().town)),
+        seed=int(sim.get("seed", SimConfig().seed)),
         lockstep=bool(lockstep),
         log=Recording.read(reader.path),
     )

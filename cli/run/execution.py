@@ -26,7 +26,7 @@ from cogmap.errors import StorageError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
 from cogmap.services import registry
-from cogmap.services.sim.layout.towns import BLOCKS, LOOP, OSM
+from cogmap.services.sim.layout.towns import LOOP, called
 
 
 @dataclass(frozen=True)
@@ -111,8 +111,7 @@ def default_limit_s(sim: dict[str, Any], choices: Choices) -> float:
 def _introduce(screen: Display, drive: Drive) -> None:
     """Show the town or the recording, the folder and the goals, and what the user has to start."""
     sim = drive.sections["sim"]
-    names = {LOOP: f"town {sim['seed']}", BLOCKS: f"town {sim['seed']} of blocks"}
-    town = names.get(sim["town"], f"the town in {sim['town'].removeprefix(OSM)}")
+    town = called(sim["town"], sim["seed"])
     screen.show(f"{drive.choices.recording or town}, files in {drive.folder}")
 
     if drive.goals:

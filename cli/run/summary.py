@@ -41,6 +41,7 @@ def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
         completed=ending.outcome in {Outcome.ROUTE_COMPLETE, Outcome.RECORDING_OVER},
         ended_by=ending.outcome.value,
         reason=ending.reason,
+        town=drive.sections["sim"]["town"],
         seed=drive.sections["sim"]["seed"],
         lockstep=drive.sections["run"]["lockstep"],
         codelets=drive.choices.codelets,

@@ -56,13 +56,15 @@ def show(name: str, seed: int | None, output: Path | None) -> None:
     """
     path = output or Path(f"{Path(name.rpartition(':')[2]).name.partition('.')[0]}{PLOTS[0]}")
     check_picture("-o", path, PLOTS)
-    place, goals_m = _place(name, Config().seed if seed is None else seed)
+    number = Config().seed if seed is None else seed
+    place, goals_m = _place(name, number)
+    title = towns.called(name, number)
 
     from cogmap.cli.plots.map.plan import draw_plan  # other verbs have no use for matplotlib
 
     logging.getLogger("matplotlib").setLevel(logging.WARNING)
     try:
-        draw_plan(path, place.message(), place.start, goals_m, f"Town {Path(name).name}")
+        draw_plan(path, place.message(), place.start, goals_m, title)
     except OSError as error:
         raise cannot_write(path, error) from None
     streets = {road.name for road in place.roads}

@@ -1,4 +1,6 @@
-"""The names of streets and buildings on a map: where there is room, none over another."""
+"""The names on a map: of streets and buildings where there is room, none over another, and of
+places that are marked.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,8 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from cogmap.cli.plots.draw import spoken
-from cogmap.cli.plots.map.sheet import px_per_m
+from cogmap.cli.plots.labels import Label
+from cogmap.cli.plots.map.sheet import m_per_pt, px_per_m
 from cogmap.cli.plots.palette import INK, PAPER
 from cogmap.schemas.sensing import Building, Street, TrueTown
 
@@ -24,6 +27,8 @@ LEVEL_RAD = 0.05
 """What is turned by less from the axes is as good as along them."""
 
 ORDER = 15
+ABOVE_PT = 9.0
+"""From a start or a goal to its name, which stands above the marker."""
 
 
 def draw_names(axes: Axes, town: TrueTown) -> None:
@@ -40,6 +45,20 @@ def draw_names(axes: Axes, town: TrueTown) -> None:
         box = _name_street(axes, street, taken)
         if box is not None:
             taken.append(box)
+
+
+def labels_of(axes: Axes, marked: Iterable[tuple[str, tuple[float, float]]]) -> list[Label]:
+    """Return labels for places that are marked, by name, above their markers; places that are one
+    share a label. The map must be arranged.
+    """
+    names: dict[tuple[float, float], list[str]] = {}
+    for name, (x_m, y_m) in marked:
+        names.setdefault((round(x_m), round(y_m)), []).append(name)
+
+    above_m = ABOVE_PT * m_per_pt(axes)
+    return [
+        Label(", ".join(shared), x_m, y_m + above_m, INK) for (x_m, y_m), shared in names.items()
+    ]
 
 
 def _name_building(axes: Axes, building: Building) -> Text | None:

@@ -18,8 +18,8 @@ from cogmap.cli.plots.draw import spoken
 from cogmap.cli.plots.labels import Label, place
 from cogmap.cli.plots.map import layers
 from cogmap.cli.plots.map.frame import town_on_map
-from cogmap.cli.plots.map.names import draw_names
-from cogmap.cli.plots.map.sheet import arrange, extent_m, m_per_pt, new_map, write_title
+from cogmap.cli.plots.map.names import draw_names, labels_of
+from cogmap.cli.plots.map.sheet import arrange, extent_m, new_map, write_title
 from cogmap.cli.plots.map.structure import draw_structure, goals_m
 from cogmap.cli.plots.map.town import draw_town
 from cogmap.cli.plots.palette import INK
@@ -27,6 +27,7 @@ from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.schemas.nodes import Object
 from cogmap.schemas.sensing import TrueTown
+from cogmap.services.sim.layout.towns import called
 
 MARGIN_M = 5.0
 ROADSIDE_M = 20.0
@@ -36,8 +37,6 @@ MAX_NAMES = 40
 """Of a recording, names of more objects than that would hide the map."""
 
 NAME_PT = 9.0
-ABOVE_PT = 9.0
-"""From a start or a goal to its name, which stands above the marker."""
 
 
 def draw(path: Path, tally: Tally, metrics: RecordedMetrics) -> None:
@@ -59,7 +58,7 @@ def draw(path: Path, tally: Tally, metrics: RecordedMetrics) -> None:
         _write_title(axes, metrics)
         if town is not None:
             draw_names(axes, town)
-        place(axes, _labels(observer, graph, ABOVE_PT * m_per_pt(axes)), NAME_PT)
+        place(axes, _labels(axes, observer, graph), NAME_PT)
 
 
 def _reached_m(observer: Observer, graph: Graph, town: TrueTown | None) -> Floats:
@@ -78,12 +77,12 @@ def _reached_m(observer: Observer, graph: Graph, town: TrueTown | None) -> Float
     return np.vstack(on_map_m)
 
 
-def _labels(observer: Observer, graph: Graph, above_m: float) -> list[Label]:
+def _labels(axes: Axes, observer: Observer, graph: Graph) -> list[Label]:
     """Return the names of start and goals and, where no town is known, of what was learned."""
     start_m = layers.start_m(observer)
     marked = [] if start_m is None else [("start", start_m)]
     marked += [(f"goal {name_of(goal.id)}", at_m) for goal, at_m in goals_m(graph)]
-    labels = [Label(name, x_m, y_m + above_m, INK) for name, (x_m, y_m) in marked]
+    labels = labels_of(axes, marked)
 
     named = [node for node in graph.of_kind(Object) if node.name]
     if observer.town is None and len(named) <= MAX_NAMES:
@@ -93,8 +92,8 @@ def _labels(observer: Observer, graph: Graph, above_m: float) -> list[Label]:
 
 def _write_title(axes: Axes, metrics: RecordedMetrics) -> None:
     """Write what was driven, what was learned on it, and how far positions err."""
-    place = metrics.recording or f"Town {metrics.seed}"
-    driven = f"{place}, driven through for {metrics.distance_m:.0f} m in {metrics.drive_s:.0f} s"
+    town = metrics.recording or called(metrics.town, metrics.seed)
+    driven = f"{town}, driven through for {metrics.distance_m:.0f} m in {metrics.drive_s:.0f} s"
     learned = f"buildings: {headline(metrics)}; {metrics.road_m2:.0f} m² of street learned"
     errors = (
         f"position error {metrics.estimate.mean_m:.2f} m on average; "

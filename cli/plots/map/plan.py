@@ -7,21 +7,18 @@ from pathlib import Path
 import numpy as np
 from matplotlib.lines import Line2D
 
-from cogmap.cli.plots.labels import Label, place
+from cogmap.cli.plots.labels import place
 from cogmap.cli.plots.map.frame import town_on_map
 from cogmap.cli.plots.map.markers import START_MARKER, goal_marker
-from cogmap.cli.plots.map.names import draw_names
-from cogmap.cli.plots.map.sheet import arrange, extent_m, m_per_pt, new_map, write_title
+from cogmap.cli.plots.map.names import draw_names, labels_of
+from cogmap.cli.plots.map.sheet import arrange, extent_m, new_map, write_title
 from cogmap.cli.plots.map.town import draw_town
-from cogmap.cli.plots.palette import INK
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_to
 from cogmap.schemas.sensing import Pose, TrueTown
 
 MARGIN_M = 5.0
 NAME_PT = 9.0
-ABOVE_PT = 9.0
-"""From a marker to its name, which stands above it."""
 
 
 def draw_plan(
@@ -51,7 +48,6 @@ def draw_plan(
         write_title(axes, title, [f"streets: {len(streets)}; buildings: {len(town.buildings)}"])
         draw_names(axes, shown)
 
-        above_m = ABOVE_PT * m_per_pt(axes)
-        marked = {"start": (0.0, 0.0)} | {f"goal {name}": at_m for name, at_m in goals.items()}
-        labels = [Label(name, x_m, y_m + above_m, INK) for name, (x_m, y_m) in marked.items()]
-        place(axes, labels, NAME_PT)
+        marked = [("start", (0.0, 0.0))]
+        marked += [(f"goal {name}", at_m) for name, at_m in goals.items()]
+        place(axes, labels_of(axes, marked), NAME_PT)

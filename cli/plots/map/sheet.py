@@ -35,6 +35,10 @@ BELOW_IN = 0.65
 ROW_IN = 0.18
 """Room for the scale of the map, for its title, and for a row of its legend."""
 
+LINES_PT = 8.0
+LINE_PT = 18.0
+"""From a map to the lines below its title, and from line to line."""
+
 COLUMNS = 2
 LEGEND_PT = 8.5
 DPI = 130
@@ -100,12 +104,13 @@ def arrange(
 
 def write_title(axes: Axes, title: str, lines: list[str]) -> None:
     """Write a title above a map, and lines below the title."""
-    apart = "\n" * len(lines)
-    axes.set_title(f"{title}{apart}", loc="left", color=INK, fontsize=14, fontweight="bold")
+    above_pt = LINES_PT + LINE_PT * len(lines)
+    written = f"{title[:1].upper()}{title[1:]}"
+    axes.set_title(written, loc="left", pad=above_pt, color=INK, fontsize=14, fontweight="bold")
     axes.annotate(
         "\n".join(lines),
         (0.0, 1.0),
-        (0.0, 8.0),
+        (0.0, LINES_PT),
         xycoords="axes fraction",
         textcoords="offset points",
         color=INK,
@@ -116,7 +121,12 @@ def write_title(axes: Axes, title: str, lines: list[str]) -> None:
 
 def extent_m(town: TrueTown) -> Floats:
     """Return points (n, 2) between which the streets and buildings of a town lie."""
-    corners = [point for street in town.streets for point in street.line_m]
+    corners = []
+    for street in town.streets:
+        reach_m = street.width_m / 2
+        for x_m, y_m in street.line_m:
+            corners += [(x_m - reach_m, y_m - reach_m), (x_m + reach_m, y_m + reach_m)]
+
     for building in town.buildings:
         reach_m = max(building.width_m, building.depth_m) / 2
         x_m, y_m = building.pose.x_m, building.pose.y_m

@@ -41,6 +41,15 @@ def is_written(town: str) -> bool:
     return town.endswith(WRITTEN) and not town.startswith(OSM)
 
 
+def called(town: str, seed: int) -> str:
+    """Return what people call a town: by its seed, or by its file."""
+    if town == LOOP:
+        return f"town {seed}"
+    if town == BLOCKS:
+        return f"town {seed} of blocks"
+    return f"the town in {town.removeprefix(OSM)}"
+
+
 def place(
     town: str, seed: int, size_m: float, *, start: int = 0, charging_places: int = 0
 ) -> Place:

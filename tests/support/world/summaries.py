@@ -29,6 +29,7 @@ def summary(mean_m: float = 1.0, **facts: Any) -> RunMetrics:
         "completed": True,
         "ended_by": "route complete",
         "reason": "the time of the drive is over",
+        "town": "loop",
         "seed": 1,
         "lockstep": True,
         "codelets": 1,

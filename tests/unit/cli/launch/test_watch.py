@@ -315,6 +315,7 @@ def run_metrics(watch: Watch) -> RunMetrics:
         completed=True,
         ended_by="route complete",
         reason="the agent was at every goal: corner 1",
+        town="loop",
         seed=1,
         lockstep=False,
         codelets=1,
