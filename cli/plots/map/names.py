@@ -36,11 +36,12 @@ def draw_names(axes: Axes, town: TrueTown) -> None:
 
     The map must be arranged.
     """
-    taken = [
-        text.get_window_extent()
-        for building in town.buildings
-        if (text := _name_building(axes, building)) is not None
-    ]
+    taken = []
+    for building in town.buildings:
+        box = _name_building(axes, building)
+        if box is not None:
+            taken.append(box)
+
     for street in sorted(town.streets, key=_longest_m, reverse=True):
         box = _name_street(axes, street, taken)
         if box is not None:
@@ -61,11 +62,14 @@ def labels_of(axes: Axes, marked: Iterable[tuple[str, tuple[float, float]]]) -> 
     ]
 
 
-def _name_building(axes: Axes, building: Building) -> Text | None:
-    """Write the name of a building above its lower side, in one line or in several; returns None if
-    it does not fit.
+def _name_building(axes: Axes, building: Building) -> Bbox | None:
+    """Write the name of a building above its lower side, in one line or in several; returns the box
+    that it takes, None if it does not fit.
     """
     width_m, height_m = _room_m(building)
+    if height_m < SIZES_PT[-1] * m_per_pt(axes):
+        return None  # of the thousands of a city nothing is measured
+
     lower_m = building.pose.y_m - height_m / 2
     px = px_per_m(axes)
     name = spoken(building.name)
@@ -75,7 +79,7 @@ def _name_building(axes: Axes, building: Building) -> Text | None:
             text.set(text=written, fontsize=size_pt)
             box = text.get_window_extent()
             if box.width <= width_m * px and box.height <= height_m * px:
-                return text
+                return box
 
     text.remove()
     return None

@@ -15,7 +15,7 @@ from cogmap.services.sim.layout.written.town import WrittenTown, read
 from cogmap.services.sim.rendering.patterns import PAINT
 from cogmap.testing import Town
 
-EXAMPLE = Path(__file__).parents[3] / "examples" / "mytown.toml"
+EXAMPLE = Path(__file__).parents[3] / "examples" / "towns" / "mytown.toml"
 SMALL = """
 [start]
 at_m = [10, 0]
