@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from cogmap.cli.plots import draw, ground
-from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, KERB, OBJECT, PAPER, ROAD, ROAD_OPACITY
+from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, KERB, PAPER, ROAD, ROAD_OPACITY
 from cogmap.recording.views import Depth, Image
 from cogmap.schemas.sensing import Percepts, View
 
@@ -98,6 +98,6 @@ def _legend() -> list[Patch | Line2D]:
         Patch(fc=ROAD, alpha=ROAD_OPACITY, label="road"),
         Line2D([], [], marker="o", ls="", ms=4, mfc=ESTIMATE, mec="white", label="where it ends"),
         Line2D(
-            [], [], marker="o", ls="", mfc=OBJECT, mec="white", label="object's centre and 2 SD"
+            [], [], marker="o", ls="", mfc=INK, mec="white", label="centre and 2 SD of each object"
         ),
     ]
