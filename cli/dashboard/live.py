@@ -32,7 +32,7 @@ from cogmap.schemas.codelets import Offer
 from cogmap.schemas.graph import DropNode, SnapshotRequest
 from cogmap.schemas.nodes import Goal, Object, goal_id
 from cogmap.schemas.process import Pause
-from cogmap.schemas.sensing import StreetClosure
+from cogmap.schemas.sensing import Reset, StreetClosure
 from cogmap.schemas.topics import Topic
 from cogmap.services.codelets.public import PlanningConfig
 from cogmap.services.global_workspace.config import Config
@@ -40,7 +40,7 @@ from cogmap.services.global_workspace.config import Config
 DASHBOARD = "dashboard"
 IDLE_S = 0.1
 RETRY_S = 1.0
-PUBLISHED = (topics.OFFER, topics.STREET_CLOSURE, topics.PAUSE)
+PUBLISHED = (topics.OFFER, topics.STREET_CLOSURE, topics.PAUSE, topics.RESET)
 
 
 class Live:
@@ -200,6 +200,9 @@ def message_for(wish: Wish, graph: Graph) -> tuple[Message, str]:
     if wish.play is not None:
         done = "time is to pass" if wish.play else "time is to stand"
         return Pause(is_paused=not wish.play), done
+
+    if wish.resets:
+        return Reset(), "the robot of a simulation is carried back to its start"
 
     if wish.clear:
         goals = [DropNode(id=goal.id) for goal in graph.of_kind(Goal)]

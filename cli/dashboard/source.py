@@ -61,8 +61,8 @@ class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     `goal` is an object's name or label, `place` x and y on the map, to go to; `clear` forgets all
     goals. `street` is to be `closed` or opened. `key` drives the robot as those of `cogmap teleop`
     do. `adds_worker` is for one more worker, `kill` the instance of one to kill. `play` is whether
-    time is to pass, `step` asks for the next cycle alone. Of a log: `seek_s` is a time to show,
-    `speed` is how fast it plays.
+    time is to pass, `step` asks for the next cycle alone, `resets` for the robot at its start
+    again. Of a log: `seek_s` is a time to show, `speed` is how fast it plays.
     """
 
     goal: Name | None = None
@@ -76,4 +76,5 @@ class Wish(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     seek_s: float | None = None
     play: bool | None = None
     step: bool = False
+    resets: bool = False
     speed: float | None = None

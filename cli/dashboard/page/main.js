@@ -208,6 +208,7 @@ byId("person").addEventListener("submit", (event) => {
 });
 byId("pause").onclick = () => wish({ play: now !== null && now.is_paused });
 byId("next").onclick = () => wish({ step: true });
+byId("reset").onclick = () => wish({ resets: true });
 byId("clear").onclick = () => wish({ clear: true });
 byId("close").onclick = () => wish({ street: byId("street").value, closed: true });
 byId("open").onclick = () => wish({ street: byId("street").value, closed: false });

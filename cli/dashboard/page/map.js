@@ -2,7 +2,7 @@
 import { byId, cleared, colour, element, resized } from "/page/dom.js";
 
 const LAYERS = [
-  ["places", "streets, what stands there, active places", "#4f9d8f", true],
+  ["places", "streets, what stands there, active places", "#009e73", true],
   ["costs", "what driving there costs: dark is dear, grey blocked", "#31688e", false],
   ["truth", "the true town and path", "var(--house)", false],
   ["districts", "districts", "var(--district)", true],
@@ -255,9 +255,10 @@ export class MapView {
       context.lineTo(x + radius * Math.cos(angle), y + radius * Math.sin(angle));
     }
     context.closePath();
-    context.strokeStyle = context.fillStyle = colour("goal");
+    context.fillStyle = colour(each.is_reached ? "goal" : "panel");
+    context.fill();
+    context.strokeStyle = colour("ink");
     context.lineWidth = 1.5;
-    if (each.is_reached) context.fill();
     context.stroke();
     context.fillStyle = colour("ink");
     context.fillText(each.name, x + 12, y + 4);

@@ -12,7 +12,7 @@ from cogmap.schemas.codelets import Offer
 from cogmap.schemas.graph import DropNode
 from cogmap.schemas.nodes import Goal
 from cogmap.schemas.process import Pause
-from cogmap.schemas.sensing import StreetClosure
+from cogmap.schemas.sensing import Reset, StreetClosure
 from cogmap.testing import graph_of, landmark
 
 GRAPH = graph_of(landmark("41a", [(3.0, 0.0)], names={"bakery": 5.0}), Goal(id="goal:home"))
@@ -48,6 +48,12 @@ def test_all_goals_are_forgotten() -> None:
 
     assert isinstance(offer, Offer)
     assert offer.operations == [DropNode(id="goal:home")]
+
+
+def test_the_robot_is_carried_back() -> None:
+    reset, _ = message_for(Wish(resets=True), GRAPH)
+
+    assert reset == Reset()
 
 
 def test_a_street_is_closed_and_opened() -> None:
