@@ -50,7 +50,7 @@ function drawTimeline() {
   const last = competitions[competitions.length - 1].at_s;
   context.fillText(`${first.toFixed(1)} s`, labels, height - 6);
   context.textAlign = "right";
-  context.fillText(`${last.toFixed(1)} s; red became conscious`, width, height - 6);
+  context.fillText(`${last.toFixed(1)} s; orange became conscious`, width, height - 6);
   context.textAlign = "left";
   const won = competitions.filter((each) => each.conscious).length;
   byId("timeline").setAttribute("aria-label",
