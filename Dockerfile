@@ -1,23 +1,70 @@
-FROM debian:bookworm-slim
+# Two images: `cogmap` has all but the OpenGL which draws the camera images of a simulated town, and
+# `sim` has that too.
+FROM debian:bookworm-slim AS system
 
 RUN apt-get update \
-    && apt-get install -y --no-install-recommends python3 python3-venv libegl1 libgl1-mesa-dri \
-    && rm -rf /var/lib/apt/lists/*
+    && apt-get install -y --no-install-recommends python3 \
+    && apt-get clean \
+    && rm -rf /var/lib/apt/lists/* /var/cache/apt /usr/share/doc /usr/share/man /usr/share/locale
 
 RUN useradd --system --uid 10001 --home-dir /var/lib/cogmap cogmap \
     && install -d -o cogmap -g cogmap /var/lib/cogmap /var/lib/cogmap/runs
 
+
+FROM system AS build
+
+RUN apt-get update && apt-get install -y --no-install-recommends python3-venv binutils
+
 COPY requirements/run.txt requirements/build.txt /opt/cogmap/requirements/
 RUN python3 -m venv /opt/cogmap/venv \
-    && /opt/cogmap/venv/bin/pip install --no-cache-dir \
+    && /opt/cogmap/venv/bin/pip install --no-cache-dir --no-compile \
         -r /opt/cogmap/requirements/run.txt -r /opt/cogmap/requirements/build.txt
 
-COPY . /opt/cogmap/source
-RUN /opt/cogmap/venv/bin/pip install --no-cache-dir --no-deps --no-build-isolation /opt/cogmap/source
+# What no drive needs of the libraries: their tests, pybullet's robots and examples, symbols for
+# debuggers, and the copy of ONNX's runtime for programs in C.
+RUN cd /opt/cogmap/venv/lib/python3*/site-packages \
+    && rm -rf pybullet_data pybullet_envs pybullet_examples pybullet_robots pybullet_utils \
+    && rm -f onnxruntime/capi/libonnxruntime.so.* \
+    && find . -type d -name tests -prune -exec rm -rf {} + \
+    && find . -name '*.so' -not -path '*.libs/*' -exec strip --strip-unneeded {} +
 
-ENV PATH=/opt/cogmap/venv/bin:$PATH PYTHONUNBUFFERED=1
+COPY . /opt/cogmap/source
+RUN /opt/cogmap/venv/bin/pip install --no-cache-dir --no-deps --no-build-isolation --no-compile \
+        /opt/cogmap/source \
+    && /opt/cogmap/venv/bin/pip uninstall --yes setuptools pip \
+    && python3 -m compileall -q /opt/cogmap/venv/lib
+
+# The map of a drive is drawn with these fonts: each container would look for them anew, and say so.
+ENV MPLCONFIGDIR=/opt/cogmap/venv/matplotlib
+RUN /opt/cogmap/venv/bin/python -c 'import matplotlib.font_manager' \
+    && chmod -R a+rwX $MPLCONFIGDIR
+
+
+# In one layer, without what was removed from those below.
+FROM scratch AS cogmap
+
+COPY --from=system / /
+COPY --from=build /opt/cogmap/venv /opt/cogmap/venv
+
+# A user who owns the folder of the runs may have any number, and has a home here too.
+ENV PATH=/opt/cogmap/venv/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
+    HOME=/tmp \
+    MPLCONFIGDIR=/opt/cogmap/venv/matplotlib \
+    PYTHONUNBUFFERED=1
+LABEL org.opencontainers.image.title="Cogmap" \
+    org.opencontainers.image.description="LIDA's cognitive architecture with spatial memory, as message-bus microservices" \
+    org.opencontainers.image.version="0.3.0" \
+    org.opencontainers.image.authors="The Cogmap maintainers"
 USER cogmap
 WORKDIR /var/lib/cogmap
-# The map of a drive is drawn with these fonts: each container would look for them anew, and say so.
-RUN python -c 'import matplotlib.font_manager'
 ENTRYPOINT ["cogmap"]
+
+
+FROM cogmap AS sim
+
+USER root
+RUN apt-get update \
+    && apt-get install -y --no-install-recommends libegl1 libgl1-mesa-dri \
+    && apt-get clean \
+    && rm -rf /var/lib/apt/lists/* /var/cache/apt /usr/share/doc
+USER cogmap

@@ -9,7 +9,9 @@ import click
 from cogmap.runtime import process
 from cogmap.runtime.program import (
     ModuleOptions,
+    agent_option,
     connect_option,
+    ends_with_option,
     module_options,
     run_with,
     tied_option,
@@ -30,7 +32,9 @@ def module(name: str, **options: Unpack[ModuleOptions]) -> None:
 
 @click.command()
 @tied_option
+@ends_with_option
 @connect_option
-def router(tied: bool, connect: str) -> None:
+@agent_option
+def router(tied: bool, ends_with: str, connect: str, agent: str) -> None:
     """Run the router that all modules connect to."""
-    process.run_router(connect, process.Stop(tied))
+    process.run_router(connect, process.Stop(tied), agent, ends_with)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import errno
 import webbrowser
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -16,8 +17,15 @@ from cogmap.cli.dashboard.server import Dashboard
 from cogmap.cli.dashboard.source import Source
 from cogmap.cli.options import DASHBOARD_PORT
 from cogmap.errors import PortInUseError
+from cogmap.runtime.company import company_at
 from cogmap.runtime.process import Stop, give_way
-from cogmap.runtime.program import agent_option, config_option, connect_option, tied_option
+from cogmap.runtime.program import (
+    agent_option,
+    config_option,
+    connect_option,
+    ends_with_option,
+    tied_option,
+)
 
 LOOK_S = 0.1
 
@@ -40,6 +48,7 @@ LOOK_S = 0.1
 )
 @click.option("--open", "opens", is_flag=True, help="Open it in a browser.")
 @tied_option
+@ends_with_option
 @connect_option
 @agent_option
 @config_option
@@ -49,6 +58,7 @@ def dashboard(
     port: int,
     opens: bool,
     tied: bool,
+    ends_with: str,
     connect: str,
     agent: str,
     config_path: Path | None,
@@ -68,14 +78,18 @@ def dashboard(
     if log is None:
         give_way()
     source: Source = Live(connect, agent, config_path) if log is None else Playback(log)
+    stop = Stop(tied)
     try:
-        asyncio.run(serve(source, host, port, opens, Stop(tied)))
+        with company_at(connect, agent, "" if log is not None else ends_with) as is_alone:
+            asyncio.run(serve(source, host, port, opens, lambda: stop.asked or is_alone()))
     finally:
         source.close()
 
 
-async def serve(source: Source, host: str, port: int, opens: bool, stop: Stop) -> None:
-    """Serve the dashboard until `stop` is asked. Raises PortInUseError if that address is taken."""
+async def serve(
+    source: Source, host: str, port: int, opens: bool, is_over: Callable[[], bool]
+) -> None:
+    """Serve the dashboard until it `is_over`. Raises PortInUseError if that address is taken."""
     runner = web.AppRunner(Dashboard(source, host).application(), access_log=None)
     await runner.setup()
     site = web.TCPSite(runner, host, port)
@@ -94,7 +108,7 @@ async def serve(source: Source, host: str, port: int, opens: bool, stop: Stop) -
     if opens:
         webbrowser.open(address)
     try:
-        while not stop.asked:
+        while not is_over():
             await asyncio.sleep(LOOK_S)
     finally:
         await runner.cleanup()

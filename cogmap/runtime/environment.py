@@ -9,6 +9,7 @@ from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name
 CONNECT = "COGMAP_CONNECT"
 AGENT = "COGMAP_AGENT"
 CONFIG = "COGMAP_CONFIG"
+ENDS_WITH = "COGMAP_ENDS_WITH"
 
 
 def endpoint() -> str:

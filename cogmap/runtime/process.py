@@ -13,6 +13,7 @@ from types import FrameType
 from cogmap.bus.session import check_name, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.runtime import environment
+from cogmap.runtime.company import company_at, watch_company
 from cogmap.runtime.heap import keep_freed_memory
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
@@ -93,9 +94,10 @@ def run_module(
     *,
     tied: bool = False,
     memory: Path | None = None,
+    ends_with: str = "",
 ) -> None:
     """Run `module` as this process until a signal to end or, if it is `tied`, the end of its
-    parent.
+    parent; or until the module `ends_with` has left the bus, or did not come.
 
     It connects to the router at `endpoint` as one of `agent`'s, by default those of $COGMAP_CONNECT
     and $COGMAP_AGENT; what it must keep is in the folder `state`, and what it remembers for later
@@ -121,18 +123,23 @@ def run_module(
     try:
         shell.open()
         log.info("%s is ready", module.instance)
-        while not stop.asked:
+        is_alone = watch_company(bus, ends_with)
+        while not stop.asked and not is_alone():
             shell.spin_once(IDLE_S)
     finally:
         shell.close()
 
 
-def run_router(endpoint: str, stop: Stop) -> None:
-    """Run a router until `stop` is asked. Raises PortInUseError."""
+def run_router(endpoint: str, stop: Stop, agent: str = "", ends_with: str = "") -> None:
+    """Run a router until `stop` is asked, or until `agent`'s module `ends_with` has left the bus,
+    or did not come. Raises PortInUseError.
+    """
     session = open_router(endpoint)
     log.info("router listens at %s", endpoint)
-    while not stop.wait(IDLE_S):  # without a time limit, a signal that comes before it is not seen
-        pass
+    with company_at(endpoint, agent, ends_with) as is_alone:
+        # Without a time limit, a signal that comes before it is not seen.
+        while not stop.wait(IDLE_S) and not is_alone():
+            pass
     _end_by_force()
     session.close()  # type: ignore[no-untyped-call]
 

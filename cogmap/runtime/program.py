@@ -60,6 +60,13 @@ set_option = click.option(
     help="Override one setting; may be repeated.",
 )
 tied_option = click.option("--tied", is_flag=True, help="End when standard input is closed.")
+ends_with_option = click.option(
+    "--ends-with",
+    default="",
+    metavar="MODULE",
+    envvar=environment.ENDS_WITH,
+    help="End when MODULE has left the bus, or does not come: `observer` is a drive's.",
+)
 _OPTIONS = (
     click.option(
         "--instance", default="", help="A name of its own, if several processes run this module."
@@ -76,6 +83,7 @@ _OPTIONS = (
     ),
     click.option("--held", is_flag=True, help="Connect only after a line on standard input."),
     tied_option,
+    ends_with_option,
     connect_option,
     agent_option,
     config_option,
@@ -91,6 +99,7 @@ class ModuleOptions(TypedDict):
     memory: Path | None
     held: bool
     tied: bool
+    ends_with: str
     connect: str
     agent: str
     config_path: Path | None
@@ -122,6 +131,7 @@ def run_with(options: ModuleOptions, build: Callable[[Sections, str], Module]) -
         options["state"],
         tied=options["tied"],
         memory=options["memory"],
+        ends_with=options["ends_with"],
     )
 
 

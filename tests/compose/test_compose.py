@@ -25,18 +25,22 @@ pytestmark = pytest.mark.compose
 
 ROOT = Path(__file__).parents[2]
 SERVICES = (*registry.MODULES, "drive", "router", "dashboard")
+WORKERS = ("--scale", "codelets=2")
 RUN = "/var/lib/cogmap/runs/latest"
 TIMEOUT_S = 90.0
+MAX_MB = {"cogmap": 700, "cogmap-sim": 900}
+OWNER = os.getuid() or 4711
+"""The user whose folder takes the results: none of the image's, and not root."""
 MAX_NEWS = 300
 """What a browser is told at most while it waits for the first cycle: ten times a second."""
 
 
 class Compose:
     """One project of `docker compose` with a drive of these options, its router and its dashboard
-    published at ports of their own.
+    published at ports of their own, and environment `variables`.
     """
 
-    def __init__(self, name: str, drive: str) -> None:
+    def __init__(self, name: str, drive: str, **variables: str) -> None:
         self.endpoint = free_endpoint()
         self.dashboard_port = free_port()
         _, _, port = self.endpoint.rpartition(":")
@@ -45,6 +49,8 @@ class Compose:
             "COGMAP_PORT": port,
             "COGMAP_DASHBOARD_PORT": str(self.dashboard_port),
             "COMPOSE_PROJECT_NAME": f"cogmap-{name}-{os.getpid()}",
+            "COMPOSE_PROFILES": "dashboard",
+            **variables,
         }
 
     def __call__(self, *arguments: str) -> str:
@@ -65,6 +71,20 @@ class Compose:
             text=True,
             check=False,
         )
+
+    def started(self, *arguments: str) -> subprocess.Popen[bytes]:
+        """Start it, and go on while it runs."""
+        command = ["docker", "compose", *arguments]
+        silent = subprocess.DEVNULL
+        return subprocess.Popen(
+            command, cwd=ROOT, env=self._environment, stdout=silent, stderr=silent
+        )
+
+    @property
+    def running(self) -> list[str]:
+        """The ids of all containers that run."""
+        ids = self("ps", "--quiet", "--status", "running")
+        return ids.split()
 
     def containers(self, service: str) -> list[str]:
         """The ids of the containers of a service."""
@@ -104,21 +124,37 @@ def image() -> None:
     pytest.skip(missing)
 
 
-def test_a_drive_ends_every_container_and_leaves_its_files(image: None, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", MAX_MB)
+def test_an_image_has_little_but_what_it_runs(image: None, name: str) -> None:
+    size_bytes = int(docker("image", "inspect", "--format", "{{.Size}}", name))
+
+    assert size_bytes / 1e6 < MAX_MB[name]
+
+
+def test_the_system_ends_with_its_drive_whose_results_are_in_a_folder_of_the_user(
+    image: None, tmp_path: Path
+) -> None:
+    if os.getuid() != OWNER:
+        os.chown(tmp_path, OWNER, OWNER)
     in_lockstep = "--town blocks --explore 8 --lockstep --time-limit 300"
-    project = Compose("short", drive=in_lockstep)
+    owner = f"{OWNER}:{OWNER}"
+    project = Compose("short", in_lockstep, COGMAP_RUNS=str(tmp_path), COGMAP_USER=owner)
     try:
-        output = project("up", "--no-color", "--exit-code-from", "drive")
-        project("cp", f"drive:{RUN}/.", str(tmp_path))
-        assert project("ps", "--quiet", "--status", "running") == ""
+        output = project("up", "--no-color")
+        running = project.running
+        told = project("run", "--rm", "cogmap", "log", "summary", "runs/latest", "--json")
     finally:
         project("down", "--volumes", "--timeout", "5")
 
-    summary = json.loads((tmp_path / "summary.json").read_text())
+    run = tmp_path / "latest"
+    summary = json.loads((run / "summary.json").read_text())
+    assert not running
     assert "route complete" in output
     assert summary["completed"]
-    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
-    assert Recording.read(tmp_path / "log.mcap") is not None
+    assert json.loads(told)["distance_m"] == pytest.approx(summary["distance_m"])
+    assert (run / "map.png").read_bytes().startswith(b"\x89PNG")
+    assert (run / "log.mcap").stat().st_uid == OWNER
+    assert Recording.read(run / "log.mcap") is not None
 
 
 @pytest.fixture(scope="module")
@@ -126,7 +162,7 @@ def compose(image: None) -> Iterator[Compose]:
     """The running system with two workers, on a long drive."""
     project = Compose("long", drive="--laps 30")
     try:
-        project("up", "--detach", "--scale", "codelets=2")
+        project("up", "--detach", "--wait", *WORKERS)
         yield project
     finally:
         project("down", "--volumes", "--timeout", "5")
@@ -146,6 +182,13 @@ def wait_until(watch: Watch, condition: Callable[[], bool]) -> None:
     while not condition():
         assert time.monotonic() < deadline_s, f"it never happened; present: {sorted(watch.present)}"
         watch.pump(0.1)
+
+
+def test_all_that_was_waited_for_is_healthy(compose: Compose) -> None:
+    for service in SERVICES:
+        for container in compose.containers(service):
+            state = docker("inspect", "--format", "{{.State.Health.Status}}", container)
+            assert state == "healthy", service
 
 
 def test_frames_lead_to_commands_that_move_the_robot(watch: Watch) -> None:
@@ -229,14 +272,26 @@ def kill(container: str) -> None:
     docker(*host, "cogmap", "-c", f"kill -9 {pid}")
 
 
-def test_when_recording_has_ended_the_doctor_misses_nobody(watch: Watch, compose: Compose) -> None:
-    wait_until(watch, lambda: watch.tally.observer.travelled_m > 0.0)
+def test_a_module_is_restarted_under_an_attached_terminal(watch: Watch, compose: Compose) -> None:
+    epam = Member("epam", "epam")
+    wait_until(watch, lambda: epam in watch.present)
+    terminal = compose.started("up", "--no-recreate", *WORKERS)
+
+    compose("restart", "epam")
+    enough = len(watch.tally.cycle_ms) + 6
+    wait_until(watch, lambda: epam in watch.present and len(watch.tally.cycle_ms) >= enough)
+
+    assert terminal.poll() is None
+    terminal.kill()  # asked to end, it would stop the system
+    terminal.wait()
+
+
+def test_a_drive_that_is_stopped_ends_the_system(compose: Compose) -> None:
     compose("stop", "drive")
 
-    findings = json.loads(compose.cogmap("sim", "doctor --json"))
-
-    missed = [finding["about"] for finding in findings if "no instance" in finding["wrong"]]
-    assert not missed, findings
+    deadline_s = time.monotonic() + TIMEOUT_S
+    while running := compose.running:
+        assert time.monotonic() < deadline_s, running
 
 
 def test_the_image_has_the_experiments(image: None) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 
 from cogmap.services import registry
+from cogmap.version import VERSION
 
 ROOT = Path(__file__).parents[3]
 
@@ -27,6 +28,18 @@ def test_the_image_gets_every_package() -> None:
     copied = {line.removeprefix("!") for line in ignored}
     assert packages
     assert packages <= copied
+
+
+def test_the_image_says_its_version() -> None:
+    label = f'org.opencontainers.image.version="{VERSION}"'
+
+    assert label in (ROOT / "Dockerfile").read_text()
+
+
+def test_every_service_has_a_health_check_but_the_one_of_verbs() -> None:
+    unchecked = [name for name, each in services().items() if "healthcheck" not in each]
+
+    assert unchecked == ["cogmap"]
 
 
 def test_every_module_is_a_service() -> None:
