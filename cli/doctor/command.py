@@ -8,13 +8,14 @@ import time
 
 import click
 import msgspec
+import psutil
 
 from cogmap.bus.discovery import discover
 from cogmap.bus.interface import Arrival, Member
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.doctor import installation, system
 from cogmap.cli.doctor.finding import Finding
-from cogmap.cli.doctor.system import Observed
+from cogmap.cli.doctor.observed import Observed
 from cogmap.cli.options import json_option
 from cogmap.cli.run.folder import RUNS
 from cogmap.cli.topic.observing import observing
@@ -66,11 +67,11 @@ def observe(bus: ZenohBus, duration_s: float) -> Observed:
     intake = Intake()
 
     def on_change(member: Member, alive: bool) -> None:
-        change = observed.ready.add if alive else observed.ready.discard
-        inbox.call(lambda: change(member))
+        inbox.call(lambda: observed.note(member, alive))
 
+    psutil.cpu_percent()  # from here on the next call measures
     bus.watch(on_change)
-    for topic in (topics.HEALTH, topics.CLOCK):
+    for topic in (topics.HEALTH, topics.CLOCK, topics.MOTOR_COMMAND):
         bus.subscribe(topic, inbox.put, intake.count_lost)
 
     end_s = time.monotonic() + duration_s
@@ -80,4 +81,5 @@ def observe(bus: ZenohBus, duration_s: float) -> Observed:
             observed.add(intake.accept(item))
         elif item is not None:
             item()
+    observed.busy = psutil.cpu_percent() / 100
     return observed

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from itertools import pairwise
 
 from cogmap.bus.discovery import Role, System
-from cogmap.bus.interface import Member
+from cogmap.cli.doctor import moment
 from cogmap.cli.doctor.finding import Finding
+from cogmap.cli.doctor.observed import Observed
 from cogmap.schemas import topics
-from cogmap.schemas.base import Message
-from cogmap.schemas.process import Clock, Health
+from cogmap.schemas.process import Health
 from cogmap.schemas.topics import Scope
 from cogmap.services import registry
 
@@ -21,37 +20,25 @@ LONG_QUEUE = 10
 MIN_REPORTS = 2
 
 
-@dataclass
-class Observed:
-    """The observations: `health` has each instance's reports in order; `clock_rate` is simulated
-    seconds a second, None if no clock was received.
-    """
-
-    ready: set[Member] = field(default_factory=set)
-    health: dict[str, list[Health]] = field(default_factory=dict)
-    clock_rate: float | None = None
-
-    def add(self, message: Message | None) -> None:
-        """Count a report or a clock; other messages are ignored."""
-        match message:
-            case Health() as health:
-                self.health.setdefault(health.instance, []).append(health)
-            case Clock() as clock:
-                self.clock_rate = clock.rate
-
-
 def examine(expected: Iterable[str], observed: Observed, system: System) -> list[Finding]:
     """Collect all findings about a system that should have the modules `expected`. The rates of a
     recording are its own.
+
+    Where it is starting or ending, that is all there is to say; where the machine is too slow, that
+    is the cause of what else is late.
     """
     modules = list(expected)
+    passing = moment.passing(modules, observed)
+    if passing is not None:
+        return [passing]
+
     rates = [] if registry.PLAYER in modules else wrong_rates(observed, system)
+    late = [*silent(modules, observed), *growing_queues(observed), *rates]
     return [
         *absent(modules, observed),
-        *silent(modules, observed),
         *not_ready(observed),
         *complaints(observed),
-        *rates,
+        *(moment.slow_machine(observed, late) or late),
         *truth_leaks(modules, system),
     ]
 
@@ -88,7 +75,7 @@ def not_ready(observed: Observed) -> Iterator[Finding]:
 
 
 def complaints(observed: Observed) -> Iterator[Finding]:
-    """Yield the losses, rejected messages, growing queues and notes that the instances report."""
+    """Yield the losses, rejected messages and notes that the instances report."""
     for instance, reports in sorted(observed.health.items()):
         last = reports[-1]
         for name, number in sorted(last.gaps.items()):
@@ -107,6 +94,13 @@ def complaints(observed: Observed) -> Iterator[Finding]:
                     "its log names them: correct their publisher",
                 )
 
+        for note in last.notes:
+            yield Finding(instance, note, "see its log")
+
+
+def growing_queues(observed: Observed) -> Iterator[Finding]:
+    """Yield a finding for each instance that has ever more messages to handle."""
+    for instance, reports in sorted(observed.health.items()):
         queued = [report.queued for report in reports]
         is_growing = all(later > earlier for earlier, later in pairwise(queued))
         if is_growing and queued[-1] >= LONG_QUEUE:
@@ -115,8 +109,6 @@ def complaints(observed: Observed) -> Iterator[Finding]:
                 f"its queue grows, to {queued[-1]} messages",
                 "give it a core of its own, or lower the rates of its inputs",
             )
-        for note in last.notes:
-            yield Finding(instance, note, "see its log")
 
 
 def wrong_rates(observed: Observed, system: System) -> Iterator[Finding]:
@@ -135,7 +127,7 @@ def wrong_rates(observed: Observed, system: System) -> Iterator[Finding]:
         if abs(measured[topic.name] - expected_hz) > RATE_TOLERANCE * expected_hz:
             yield Finding(
                 topic.name,
-                f"{measured[topic.name]:.1f} Hz, the table has {expected_hz:g} Hz",
+                f"{measured[topic.name]:.1f} Hz, the table has {expected_hz:.3g} Hz",
                 f"see with `cogmap topic delay {topic.name}` where the time goes",
             )
 

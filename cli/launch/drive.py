@@ -29,7 +29,7 @@ from cogmap.cli.launch.plan import (
 from cogmap.cli.launch.supervisor import Supervisor
 from cogmap.cli.launch.tally import Tally
 from cogmap.cli.launch.watch import Watch
-from cogmap.cli.launch.watchdog import REMEDY, Situation, Watchdog
+from cogmap.cli.launch.watchdog import MAX_SHARE_SLOWED, REMEDY, Situation, Watchdog
 from cogmap.cli.options import DASHBOARD_PORT
 from cogmap.errors import ProcessFailedError
 from cogmap.runtime.config import Sections
@@ -41,7 +41,6 @@ PUMP_S = 0.05
 SHOW_PERIOD_S = 0.25
 GRACE_S = 3.0
 QUIET_S = 0.3
-MAX_SHARE_SLOWED = 0.3
 MAX_NAMES = 8
 FINISH_S = 4.0
 FIRST_POSE = "first pose"

@@ -13,7 +13,12 @@ STALLED_S = 30.0
 STUCK_S = 30.0
 MIN_MOVE_M = 2.0
 WAITS = (SpeedLimit.NO_ROUTE, SpeedLimit.AT_GOAL)
-REMEDY = "end other programs, or use --lockstep, which waits for every answer"
+REMEDY = (
+    "end other programs, close browsers that look at the dashboard, or use --lockstep, which waits "
+    "for every answer"
+)
+MAX_SHARE_SLOWED = 0.3
+"""Where more of the commands are limited by the age of their poses, the machine is too slow."""
 
 
 @dataclass(frozen=True)

@@ -24,9 +24,11 @@ from cogmap.cli.launch.drive_metrics import (
 )
 from cogmap.cli.launch.outcome import Ending, Outcome
 from cogmap.cli.launch.watch import Watch
+from cogmap.cli.launch.watchdog import MAX_SHARE_SLOWED, REMEDY
 from cogmap.cli.run.folder import SUMMARY_NAME
 from cogmap.recording.storage.format import LOG_NAME
 from cogmap.schemas.sensing import SpeedLimit
+from cogmap.services.motor.config import Config as MotorConfig
 
 MAP_NAME = "map.png"
 NAMED = 8
@@ -117,6 +119,7 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         ("forgotten", _first(metrics.forgotten, ", ") or "nothing"),
         ("cycle", f"{metrics.cycle_p50_ms:.0f} ms, 99 % within {metrics.cycle_p99_ms:.0f} ms"),
         ("slowed or halted", ", ".join(shares) or "never"),
+        *_machine_rows(metrics, limits[SpeedLimit.POSE_AGE.value]),
     ]
     if metrics.recalled_m is not None:
         rows.append(("recalled", f"{metrics.recalled}, after {metrics.recalled_m:.1f} m"))
@@ -126,6 +129,22 @@ def drive_rows(metrics: DriveMetrics) -> list[tuple[str, str]]:
         shown = "ran out" if energy.ran_out else levels
         rows.append(("energy", f"{shown}; charged {energy.charged} times"))
     return rows
+
+
+def _machine_rows(metrics: DriveMetrics, limited: int) -> list[tuple[str, str]]:
+    """Make the row that names a machine on which the age of the poses has limited too many
+    commands.
+    """
+    if limited <= MAX_SHARE_SLOWED * metrics.commands:
+        return []
+
+    motor = MotorConfig()
+    needed_ms = 1000 * motor.blind_m / motor.cruise_m_s
+    slow = (
+        f"too slow for real time: a cycle takes {metrics.cycle_p50_ms:.0f} ms, and the robot "
+        f"cruises where it takes {needed_ms:.0f} ms: {REMEDY}"
+    )
+    return [("machine", slow)]
 
 
 def _played(metrics: DriveMetrics) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 
@@ -10,7 +11,8 @@ import pytest
 from cogmap.bus.discovery import Process, Role, System, Use
 from cogmap.bus.interface import Member
 from cogmap.cli.doctor import installation
-from cogmap.cli.doctor.system import Observed, examine
+from cogmap.cli.doctor.observed import Observed
+from cogmap.cli.doctor.system import examine
 from cogmap.schemas import topics
 from cogmap.schemas.process import Health
 from cogmap.schemas.topics import Topic
@@ -44,8 +46,10 @@ def system(role: Role = Role.PUBLISHES, topic: Topic = topics.SCAN) -> System:
     return System("agent", (process,), (use,))
 
 
-def findings(observed: Observed, on: System | None = None) -> list[str]:
-    return [str(finding) for finding in examine(["sensory"], observed, on or system())]
+def findings(
+    observed: Observed, on: System | None = None, expected: Sequence[str] = ("sensory",)
+) -> list[str]:
+    return [str(finding) for finding in examine(expected, observed, on or system())]
 
 
 def observed(*reports: Health, clock_rate: float | None = 1.0) -> Observed:
@@ -60,9 +64,11 @@ def test_a_system_that_is_well_has_no_findings() -> None:
 
 
 def test_a_module_that_is_not_there_is_named() -> None:
-    (finding,) = findings(Observed(set(), {}, 1.0))
+    old = observed(health(100), health(102))
 
-    assert finding.startswith("sensory: no instance of it is on the bus")
+    (finding,) = findings(old, expected=["sensory", "epam"])
+
+    assert finding.startswith("epam: no instance of it is on the bus")
 
 
 def test_a_module_that_reports_nothing_is_named() -> None:
@@ -72,7 +78,7 @@ def test_a_module_that_reports_nothing_is_named() -> None:
 
 
 def test_a_module_that_is_not_ready_is_named() -> None:
-    (finding,) = findings(observed(health(10, ready=False), health(12, ready=False)))
+    (finding,) = findings(observed(health(100, ready=False), health(102, ready=False)))
 
     assert finding.startswith("sensory: it is not ready")
 

@@ -309,6 +309,19 @@ def test_the_summary_names_the_first_goals_that_were_not_reached(watch: Watch) -
     assert "not reached" not in dict(drive_rows(metrics_of(watch)))
 
 
+@pytest.mark.parametrize(("limited", "is_slow"), [(29, False), (31, True)])
+def test_the_summary_names_a_machine_that_is_too_slow(
+    watch: Watch, limited: int, is_slow: bool
+) -> None:
+    slowed = {SpeedLimit.POSE_AGE.value: limited}
+    metrics = msgspec.structs.replace(
+        metrics_of(watch), commands=100, slowed=slowed, cycle_p50_ms=812.0
+    )
+    row = dict(drive_rows(metrics)).get("machine", "")
+
+    assert row.startswith("too slow for real time: a cycle takes 812 ms") == is_slow
+
+
 def run_metrics(watch: Watch) -> RunMetrics:
     return RunMetrics(
         **msgspec.structs.asdict(metrics_of(watch)),
