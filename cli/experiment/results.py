@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from io import BytesIO
 from pathlib import Path
@@ -28,11 +28,12 @@ KINDS = ("png", "pdf")
 
 
 def folder_for(name: str, out: Path | None) -> Path:
-    """Make `out`, or the folder runs/`name`, if it is missing; one that was made is gone again when
-    the command has ended without writing there. Raises UsageError if it cannot be made.
+    """Make `out`, or the folder runs/`name`, if it is missing; one that was made, and those around
+    it, are gone again when the command has ended without writing there. Raises UsageError if it
+    cannot be made.
     """
     folder = out if out is not None else Path("runs") / name
-    is_new = not folder.exists()
+    made = [path for path in (folder, *folder.parents) if not path.exists()]
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -41,14 +42,14 @@ def folder_for(name: str, out: Path | None) -> Path:
             f"cannot make the folder {folder} ({error.strerror}): name another with --out"
         ) from None
 
-    if is_new:
-        click.get_current_context().call_on_close(lambda: _remove_empty(folder))
+    click.get_current_context().call_on_close(lambda: _remove_empty(made))
     return folder
 
 
-def _remove_empty(folder: Path) -> None:
-    with suppress(OSError):  # it is not empty, and stays
-        folder.rmdir()
+def _remove_empty(folders: Iterable[Path]) -> None:
+    with suppress(OSError):  # one is not empty, and stays
+        for folder in folders:
+            folder.rmdir()
 
 
 def command_line() -> str:

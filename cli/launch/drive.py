@@ -17,7 +17,6 @@ from cogmap.cli.launch.observer import Observer
 from cogmap.cli.launch.outcome import Ending, Outcome
 from cogmap.cli.launch.plan import (
     CONFIG_NAME,
-    EXPLORE_S,
     RECORDER,
     ROUTER,
     STATE_NAME,
@@ -74,7 +73,7 @@ class Drive:
         self._paused_s = 0.0
         self.guide: Guide | None = None
         if self.choices.tour:
-            self.guide = Guide(EXPLORE_S, self.choices.goals)
+            self.guide = Guide(self.choices.explores_s, self.choices.goals)
 
     @property
     def participants(self) -> Mapping[str, int]:

@@ -82,6 +82,11 @@ class Choices:
         """Return the modules that take part."""
         return registry.taking_part(registry.PLAYER if self.recording else registry.SIM)
 
+    @property
+    def explores_s(self) -> float:
+        """Return how long the agent explores on a tour."""
+        return EXPLORE_S if self.explore_s is None else self.explore_s
+
 
 def effective(base: Sections, choices: Choices, observer: bool) -> Sections:
     """Make the whole configuration of every module: `base`, the choices, the agent's first goals,
@@ -133,10 +138,11 @@ def _chosen(base: Sections, choices: Choices, observer: bool) -> Sections:
     if choices.town is not None:
         sim["town"] = choices.town
     if choices.tour:
+        longer_s = choices.explores_s - EXPLORE_S
         sim.setdefault("town", BLOCKS)
         sim.setdefault("sensing", "percepts")  # so that its minutes take seconds
         sim.setdefault("town_size_m", TOUR_TOWN_M)
-        sim.setdefault("duration_s", TOUR_LIMIT_S)
+        sim.setdefault("duration_s", TOUR_LIMIT_S + longer_s)
     if sim.get("sensing") == "percepts":
         sim.setdefault("noise", msgspec.to_builtins(FUSED))
     if "trajectory" not in sim:

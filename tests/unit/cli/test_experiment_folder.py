@@ -33,6 +33,13 @@ def test_a_folder_in_which_nothing_was_written_is_gone(tmp_path: Path, writes: b
     assert folder.exists() == writes
 
 
+@pytest.mark.parametrize("writes", [True, False])
+def test_a_folder_around_it_is_gone_with_it(tmp_path: Path, writes: bool) -> None:
+    ended(tmp_path / "runs" / "experiment", writes=writes)
+
+    assert (tmp_path / "runs").exists() == writes
+
+
 def test_a_folder_of_the_user_stays(tmp_path: Path) -> None:
     ended(tmp_path, writes=False)
 

@@ -259,6 +259,13 @@ def test_toml_keeps_every_character_and_infinity() -> None:
     assert read == sections
 
 
+def test_a_tour_explores_for_as_long_as_is_chosen() -> None:
+    usual = configured(Choices(tour=True))
+    longer = configured(Choices(tour=True, explore_s=Choices().explores_s + 60.0))
+
+    assert longer["sim"]["duration_s"] == usual["sim"]["duration_s"] + 60.0
+
+
 @pytest.mark.parametrize("town", ["loop", "blocks"])
 def test_a_tour_is_of_the_town_that_is_chosen(town: str) -> None:
     sections = configured(Choices(tour=True, town=town))
