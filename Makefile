@@ -4,8 +4,9 @@ INSTALLED := .venv/installed
 TRAINS := .venv/trains
 MEASURES := .venv/measures
 RERUN := .venv/rerun
+DOCUMENTS := .venv/documents
 
-.PHONY: help setup train-setup bench-setup rerun-setup demo test test-compose lint generated bench release clean
+.PHONY: help setup train-setup bench-setup rerun-setup demo test test-compose lint docs generated bench release clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -61,6 +62,14 @@ lint: setup ## style, types, and which package imports which; needs no torch
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+docs: $(DOCUMENTS) ## the documentation as a site, in build/docs; fails where a link leads nowhere
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict
+	@echo "$(CURDIR)/build/docs/index.html"
+
+$(DOCUMENTS): $(INSTALLED) requirements/docs.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -r requirements/docs.txt
+	touch $@
 
 generated: setup ## what follows from the code: golden messages, tables and code in the docs
 	$(BIN)/python -m cogmap.schemas.export --golden schemas/golden
