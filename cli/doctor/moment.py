@@ -25,13 +25,11 @@ def passing(expected: Sequence[str], observed: Observed) -> Finding | None:
 
 
 def ending(expected: Sequence[str], observed: Observed) -> Finding | None:
-    """Tell that a system ends: what moves has left or whoever watches the drive, or several modules
-    have; one alone has died.
+    """Tell that a system ends: whoever watches the drive has left, or several modules have; one
+    alone has died.
     """
-    first = {*registry.BODIES, OBSERVER}
-    left = {member.module for member in observed.left}
-    left &= {*expected, *first}
-    if not left & first and len(left) < 2:
+    left = {member.module for member in observed.left} & {*expected, OBSERVER}
+    if OBSERVER not in left and len(left) < 2:
         return None
 
     names = ", ".join(sorted(left))

@@ -33,11 +33,14 @@ def examine(expected: Iterable[str], observed: Observed, system: System) -> list
         return [passing]
 
     rates = [] if registry.PLAYER in modules else wrong_rates(observed, system)
-    late = [*silent(modules, observed), *growing_queues(observed), *rates]
+    refused = list(rejections(observed))
+    too_old = [finding for name, finding in refused if name == topics.MOTOR_COMMAND.name]
+    late = [*silent(modules, observed), *growing_queues(observed), *rates, *too_old]
     return [
         *absent(modules, observed),
         *not_ready(observed),
         *complaints(observed),
+        *(finding for _, finding in refused if finding not in too_old),
         *(moment.slow_machine(observed, late) or late),
         *truth_leaks(modules, system),
     ]
@@ -75,7 +78,7 @@ def not_ready(observed: Observed) -> Iterator[Finding]:
 
 
 def complaints(observed: Observed) -> Iterator[Finding]:
-    """Yield the losses, rejected messages and notes that the instances report."""
+    """Yield the losses and notes that the instances report."""
     for instance, reports in sorted(observed.health.items()):
         last = reports[-1]
         for name, number in sorted(last.gaps.items()):
@@ -86,16 +89,17 @@ def complaints(observed: Observed) -> Iterator[Finding]:
                     "see whether its queue is full, or the link",
                 )
 
-        for name, number in sorted(last.rejected.items()):
-            if number:
-                yield Finding(
-                    instance,
-                    f"it rejected {number} messages of {name}",
-                    "its log names them: correct their publisher",
-                )
-
         for note in last.notes:
             yield Finding(instance, note, "see its log")
+
+
+def rejections(observed: Observed) -> Iterator[tuple[str, Finding]]:
+    """Yield a finding for each topic of which an instance rejected messages, with its name."""
+    for instance, reports in sorted(observed.health.items()):
+        for name, number in sorted(reports[-1].rejected.items()):
+            if number:
+                wrong = f"it rejected {number} messages of {name}"
+                yield name, Finding(instance, wrong, "its log names them: correct their publisher")
 
 
 def growing_queues(observed: Observed) -> Iterator[Finding]:

@@ -5,11 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from msgspec import structs
 
+from cogmap.bus.discovery import System
 from cogmap.bus.interface import Member
-from cogmap.cli.doctor import moment
+from cogmap.cli.doctor import moment, system
 from cogmap.cli.doctor.finding import Finding
 from cogmap.cli.doctor.observed import Observed
+from cogmap.cli.launch.plan import OBSERVER
+from cogmap.schemas import topics
 from cogmap.schemas.process import Health
 from cogmap.schemas.sensing import MotorCommand, SpeedLimit
 
@@ -17,6 +21,7 @@ EXPECTED = ("sim", "epam", "motor")
 SIM = Member("sim", "sim")
 EPAM = Member("epam", "epam")
 MOTOR = Member("motor", "motor")
+DRIVE = Member(OBSERVER, OBSERVER)
 SILENT = Finding("epam", "it is on the bus but reports nothing", "see its log")
 
 
@@ -58,7 +63,7 @@ def test_whoever_is_missing_in_the_beginning_may_still_come() -> None:
     assert not told(moving)
 
 
-@pytest.mark.parametrize("left", [{SIM}, {EPAM, MOTOR}], ids=["its body", "several"])
+@pytest.mark.parametrize("left", [{DRIVE}, {SIM, MOTOR}], ids=["its drive", "several"])
 def test_a_system_whose_modules_leave_is_ending(left: set[Member]) -> None:
     ending = Observed({SIM, EPAM, MOTOR} - left, reported(uptime_s=100.0), left=left)
 
@@ -66,7 +71,7 @@ def test_a_system_whose_modules_leave_is_ending(left: set[Member]) -> None:
 
 
 def test_one_module_that_leaves_has_died() -> None:
-    assert not told(Observed({SIM, EPAM}, reported(uptime_s=100.0), left={MOTOR}))
+    assert not told(Observed({EPAM, MOTOR}, reported(uptime_s=100.0), left={SIM}))
 
 
 def test_whoever_comes_back_has_not_left() -> None:
@@ -101,3 +106,17 @@ def test_old_poses_are_the_machines() -> None:
     (finding,) = moment.slow_machine(observed, [])
 
     assert "50% of its poses are old" in finding.wrong
+
+
+def test_commands_that_came_too_late_are_the_machines() -> None:
+    refused = structs.replace(
+        reported(uptime_s=100.0)["sim"][0], rejected={topics.MOTOR_COMMAND.name: 2}
+    )
+    slow = Observed({SIM}, {"sim": [refused]}, commands=10, limited=10)
+    nothing = System("agent", (), ())
+
+    findings = system.examine(["sim"], slow, nothing)
+    well = system.examine(["sim"], replace(slow, limited=0), nothing)
+
+    assert [finding.about for finding in findings] == ["machine"]
+    assert [finding.about for finding in well] == ["sim"]
