@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from cogmap.bus.session import free_port
+from cogmap.bus.session import free_port, listens
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.launch.display import Display
 from cogmap.cli.launch.forking.client import ForkServer
@@ -69,7 +69,8 @@ class Drive:
     def __post_init__(self) -> None:
         self.supervisor = Supervisor(self.folder, self.server)
         self._watchdog = Watchdog()
-        self._serves_dashboard = False
+        self._dashboard_port: int | None = None
+        self._has_shown_dashboard = False
         self._paused_s = 0.0
         self.guide: Guide | None = None
         if self.choices.tour:
@@ -178,15 +179,20 @@ class Drive:
         return ending
 
     def _serve_dashboard(self, display: Display) -> None:
-        """Serve the dashboard, once the start of the others takes no longer for it."""
-        if not self.choices.dashboard or self._serves_dashboard:
+        """Serve the dashboard, once the start of the others takes no longer for it, and name its
+        address once it answers there.
+        """
+        if not self.choices.dashboard or self._has_shown_dashboard:
             return
 
-        self._serves_dashboard = True
-        port = free_port(DASHBOARD_PORT)
-        opens = self.choices.opens_dashboard
-        self.supervisor.start(dashboard(self.folder, self.endpoint, self.agent, port, opens))
-        display.show(f"dashboard: http://127.0.0.1:{port}")
+        if self._dashboard_port is None:
+            self._dashboard_port = free_port(DASHBOARD_PORT)
+            opens = self.choices.opens_dashboard
+            served = dashboard(self.folder, self.endpoint, self.agent, self._dashboard_port, opens)
+            self.supervisor.start(served)
+        elif listens(self._dashboard_port):
+            self._has_shown_dashboard = True
+            display.show(f"dashboard: http://127.0.0.1:{self._dashboard_port}")
 
     def _note(self, milestone: str) -> None:
         """Keep when a milestone was reached for the first time."""

@@ -67,6 +67,15 @@ def free_port(wanted: int = 0) -> int:
     raise PortInUseError("no port of this machine is free: end something that listens")
 
 
+def listens(port: int) -> bool:
+    """Return whether something listens at `port` of this machine."""
+    try:
+        socket.create_connection(("127.0.0.1", port), ANSWER_S).close()
+    except OSError:
+        return False
+    return True
+
+
 def open_client(
     endpoint: str,
     timeout_s: float = CONNECT_TIMEOUT_S,
