@@ -21,7 +21,6 @@ from cogmap.runtime.company import company_at
 from cogmap.runtime.process import Stop, give_way
 from cogmap.runtime.program import (
     agent_option,
-    config_option,
     connect_option,
     ends_with_option,
     tied_option,
@@ -51,7 +50,6 @@ LOOK_S = 0.1
 @ends_with_option
 @connect_option
 @agent_option
-@config_option
 def dashboard(
     log: Path | None,
     host: str,
@@ -61,7 +59,6 @@ def dashboard(
     ends_with: str,
     connect: str,
     agent: str,
-    config_path: Path | None,
 ) -> None:
     """Show the mind in a browser: of a running system, or of LOG, a log or a run's folder.
 
@@ -77,7 +74,7 @@ def dashboard(
     """
     if log is None:
         give_way()
-    source: Source = Live(connect, agent, config_path) if log is None else Playback(log)
+    source: Source = Live(connect, agent) if log is None else Playback(log)
     stop = Stop(tied)
     try:
         with company_at(connect, agent, "" if log is not None else ends_with) as is_alone:

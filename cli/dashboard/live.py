@@ -6,6 +6,7 @@ import os
 import threading
 import time
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import msgspec
@@ -18,12 +19,14 @@ from cogmap.cli.dashboard.received import Arrived
 from cogmap.cli.dashboard.scene import FOLLOWED, Scene
 from cogmap.cli.dashboard.source import Playing, Wish
 from cogmap.cli.dashboard.workers import Workers
+from cogmap.cli.param import ANSWER_S, settings_of
 from cogmap.errors import NoAnswerError, NoRouterError, UsageError
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import called
 from cogmap.graph.replica import Fetched, Replica, snapshot_over
 from cogmap.hints import did_you_mean
 from cogmap.runtime import config
+from cogmap.runtime.config import Sections
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.schemas import topics
@@ -44,11 +47,11 @@ PUBLISHED = (topics.OFFER, topics.STREET_CLOSURE, topics.PAUSE, topics.RESET)
 
 
 class Live:
-    """The system at `endpoint`, whose settings are in the file `config_path` if that is given. It
-    is on the bus only while a browser watches, and costs nothing else. Raises ConfigError.
+    """The system at `endpoint`. It is on the bus only while a browser watches, and costs nothing
+    else.
     """
 
-    def __init__(self, endpoint: str, agent: str, config_path: Path | None = None) -> None:
+    def __init__(self, endpoint: str, agent: str) -> None:
         self.label = f"{agent} at {endpoint}"
         self.lock = threading.Lock()
         self._endpoint = endpoint
@@ -57,9 +60,8 @@ class Live:
         self._has_ended = threading.Event()
         self._connection: Connection | None = None
         self._driving = Driving(endpoint, agent)
-        self._workers = Workers(endpoint, agent, config_path)
-        self._sections = config.load(config_path, ())
-        self.scene = self._scene(Replica(_nowhere))
+        self._workers = Workers(endpoint, agent)
+        self.scene = self._scene(Replica(_nowhere), {})
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
 
@@ -89,7 +91,7 @@ class Live:
         if wish.key is not None:
             return self._driving.press(wish.key)
         if wish.adds_worker:
-            return self._workers.add()
+            return self._workers.add(connection.sections)
         if wish.kill is not None:
             return self._workers.kill(wish.kill)
 
@@ -106,9 +108,9 @@ class Live:
         self._driving.leave()
         self._workers.close()
 
-    def _scene(self, replica: Replica) -> Scene:
-        settings = config.recorded(self._sections, "global_workspace", Config)
-        planning = config.recorded(self._sections, "planning", PlanningConfig)
+    def _scene(self, replica: Replica, sections: Sections) -> Scene:
+        settings = config.recorded(sections, "global_workspace", Config)
+        planning = config.recorded(sections, "planning", PlanningConfig)
         return Scene(replica.graph, replica.follow, settings, planning, Path(self.label))
 
     def _work(self) -> None:
@@ -126,11 +128,11 @@ class Live:
     def _follow(self, bus: ZenohBus) -> None:
         """Follow the system until nobody watches it, or its router is gone."""
         replica = Replica(snapshot_over(bus))
-        scene = self._scene(replica)
+        connection = Connection(bus)
+        scene = self._scene(replica, connection.sections)
         with self.lock:
             scene.follow_on(self.scene)
             self.scene = scene
-        connection = Connection(bus)
         try:
             replica.join()
             self._connection = connection
@@ -144,7 +146,10 @@ class Live:
 
 
 class Connection:
-    """Receives the messages of a system, and publishes what a person wishes."""
+    """Receives the messages of a system, and publishes what a person wishes.
+
+    `sections` are the settings of its modules; there are none while no module answers.
+    """
 
     def __init__(self, bus: ZenohBus) -> None:
         self._bus = bus
@@ -158,6 +163,9 @@ class Connection:
             bus.declare(topic)
         for topic in FOLLOWED:
             bus.subscribe(topic, self._inbox.put, self._intake.count_lost)
+        self.sections: Sections = {}
+        with suppress(NoAnswerError):
+            self.sections = settings_of(bus, ANSWER_S)
 
     def pump(self, live: Live) -> None:
         """Hand to the scene all that has arrived, waiting IDLE_S for the first of it."""

@@ -5,41 +5,39 @@ from __future__ import annotations
 import subprocess
 from itertools import count
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import psutil
+import tomli_w
 
 from cogmap.cli.launch.command_line import cogmap_command, environment
 from cogmap.errors import UsageError
+from cogmap.runtime.config import Sections
 
 MODULE = "codelets"
 KILL_TIMEOUT_S = 5.0
 
 
 class Workers:
-    """The workers of the system at `endpoint`, whose settings are in the file `config_path`. Those
-    that were added end with this.
-    """
+    """The workers of the system at `endpoint`. Those that were added end with this."""
 
-    def __init__(self, endpoint: str, agent: str, config_path: Path | None) -> None:
+    def __init__(self, endpoint: str, agent: str) -> None:
         self._endpoint = endpoint
         self._agent = agent
-        self._config_path = config_path
+        self._folder = TemporaryDirectory(prefix="cogmap-workers-")
         self._numbers = count(1)
         self._added: dict[str, subprocess.Popen[bytes]] = {}
 
-    def add(self) -> str:
-        """Start one more. Returns a sentence on what was done. Raises UsageError if the settings of
-        the others are not known.
-        """
-        if self._config_path is None:
-            raise UsageError(
-                "a worker needs the settings of the others: "
-                "start `cogmap dashboard --config runs/latest/config.toml`"
-            )
-
+    def add(self, sections: Sections) -> str:
+        """Start one more, with the settings of the others. Returns a sentence on what was done."""
         instance = f"{MODULE}-added-{next(self._numbers)}"
         places = ("--connect", self._endpoint, "--agent", self._agent)
-        config = ("--config", str(self._config_path))
+        config_path = Path(self._folder.name) / f"{instance}.toml"
+        given = {}
+        for name, section in sections.items():
+            given[name] = {key: value for key, value in section.items() if value is not None}
+        config_path.write_text(tomli_w.dumps(given), encoding="utf-8")
+        config = ("--config", str(config_path))
         command = cogmap_command(
             "module", MODULE, "--instance", instance, "--tied", *places, *config
         )
@@ -75,3 +73,4 @@ class Workers:
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
+        self._folder.cleanup()

@@ -188,7 +188,7 @@ class Drive:
         if self._dashboard_port is None:
             self._dashboard_port = free_port(DASHBOARD_PORT)
             opens = self.choices.opens_dashboard
-            served = dashboard(self.folder, self.endpoint, self.agent, self._dashboard_port, opens)
+            served = dashboard(self.endpoint, self.agent, self._dashboard_port, opens)
             self.supervisor.start(served)
         elif listens(self._dashboard_port):
             self._has_shown_dashboard = True

@@ -269,11 +269,9 @@ def programs(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[
     return [*first, *(program for program in found if program not in first)]
 
 
-def dashboard(folder: Path, endpoint: str, agent: str, port: int, opens: bool) -> Program:
-    """Return the process that serves the dashboard of the run in `folder` at `port`."""
-    config_path = str(folder / CONFIG_NAME)
-    options = ["--tied", "--connect", endpoint, "--agent", agent, "--config", config_path]
-    options += ["--port", str(port)]
+def dashboard(endpoint: str, agent: str, port: int, opens: bool) -> Program:
+    """Return the process that serves the dashboard at `port`."""
+    options = ["--tied", "--connect", endpoint, "--agent", agent, "--port", str(port)]
     if opens:
         options.append("--open")
     command = cogmap_command("dashboard", *options)

@@ -194,7 +194,7 @@ def test_a_worker_is_added_and_another_one_is_killed(
 ) -> None:
     run = start(*PERCEPTS)
     run.wait_for(DRIVING)
-    served = serve("--connect", run.endpoint, "--config", str(run.folder / "config.toml"))
+    served = serve("--connect", run.endpoint)
     before = run.pid_of("codelets-1")
     with browser() as page:
         page.get(served.address)

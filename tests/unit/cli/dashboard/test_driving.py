@@ -19,11 +19,6 @@ def test_a_robot_that_is_not_driven_can_be_left() -> None:
     assert Driving(free_endpoint(), "agent").press("q") == "the robot is left alone"
 
 
-def test_a_worker_is_not_added_without_the_settings_of_the_others() -> None:
-    with pytest.raises(UsageError, match="--config"):
-        Workers(free_endpoint(), "agent", None).add()
-
-
 def test_a_worker_that_does_not_run_here_is_not_killed() -> None:
     with pytest.raises(UsageError, match="on its own machine"):
-        Workers(free_endpoint(), "agent", None).kill("codelets-1")
+        Workers(free_endpoint(), "agent").kill("codelets-1")
