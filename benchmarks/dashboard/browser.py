@@ -14,7 +14,13 @@ from selenium.webdriver.chrome.service import Service
 
 from cogmap.errors import UsageError
 
-ARGUMENTS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-background-networking")
+ARGUMENTS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-background-networking",
+    "--disable-dev-shm-usage",  # in a container it is too small for a page
+)
 
 
 @contextmanager

@@ -14,6 +14,7 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
 from cogmap.recording import open_log, selection
 from cogmap.recording.exporting.foxglove import write_foxglove
+from cogmap.recording.exporting.rerun import library, write_rerun
 from cogmap.recording.exporting.rosbag2 import write_rosbag2
 from cogmap.recording.exporting.tables import TableFormat, write_tables
 from cogmap.recording.log import Log
@@ -42,6 +43,7 @@ FORMATS: dict[str, tuple[Write, Lost]] = {
     "csv": (partial(_write_tables, TableFormat.CSV), round_trips.lost_in_csv),
     "parquet": (partial(_write_tables, TableFormat.PARQUET), round_trips.lost_in_parquet),
     "foxglove": (write_foxglove, round_trips.lost_in_foxglove),
+    "rerun": (write_rerun, round_trips.lost_in_rerun),
     "rosbag2": (write_rosbag2, round_trips.lost_in_bag),
 }
 """What writes each format, and what counts the messages that do not come back as they were."""
@@ -54,6 +56,7 @@ def measure(setting: Setting, source: Path | None = None) -> Metrics:
     the drive a second is real time, whatever the machine took to drive it. Each is read back by the
     library of the format, a bag of ROS as a recording is. Takes five minutes.
     """
+    library()  # which is not in every set-up: says so at once
     announce = setting.announce
     if source is None:
         announce(f"driving for {DRIVE_S} s in lockstep")

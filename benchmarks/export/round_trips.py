@@ -15,6 +15,8 @@ from cogmap.data.bags.bag import Bag
 from cogmap.data.bags.pairs import PairRecording, read_pairs
 from cogmap.data.bags.topics import Topics
 from cogmap.errors import UsageError
+from cogmap.geometry.arrays import Floats
+from cogmap.recording.exporting import rerun as entities
 from cogmap.recording.exporting.tables import flat
 from cogmap.recording.log import Log
 from cogmap.schemas import topics
@@ -72,10 +74,31 @@ def lost_in_foxglove(log: Log, path: Path) -> int:
 
     depths = [(view.depth_m.shape, bytes(view.depth_m.data)) for view in _all(log, View)]
     images = [((image.height, image.width), image.data) for image in found["/depth"]]
-    places_m = [(true.pose.x_m, true.pose.y_m) for true in _all(log, TruePose)]
+    places_m = [tuple(place) for place in _true_places_m(log).tolist()]
     points = [truth.pose.position for truth in found["/truth"]]
     shown_m = [(point.x, point.y) for point in points]
     return _differing(depths, images) + _differing(places_m, shown_m)
+
+
+def lost_in_rerun(log: Log, path: Path) -> int:
+    """Count the views whose depth, and the true poses that, are missing in the file, or differ."""
+    from rerun.chunk import RrdReader
+
+    depths: list[bytes] = []
+    places_m: list[tuple[float, float]] = []
+    for chunk in RrdReader(path).stream():
+        rows = chunk.to_record_batch()
+        match chunk.entity_path.removeprefix("/"):
+            case entities.DEPTH:
+                buffers = rows.column("DepthImage:buffer")
+                depths += [buffer.values[0].values.to_numpy().tobytes() for buffer in buffers]
+            case entities.TRUTH:
+                (places,) = zip(*rows.column("Transform3D:translation").to_pylist(), strict=True)
+                places_m += [(x_m, y_m) for x_m, y_m, _ in places]
+
+    seen = [bytes(view.depth_m.data) for view in _all(log, View)]
+    true_m = [(float(x), float(y)) for x, y in _true_places_m(log).astype(np.float32)]
+    return _differing(seen, depths) + _differing(true_m, places_m)
 
 
 def lost_in_bag(log: Log, folder: Path) -> int:
@@ -116,6 +139,12 @@ def _lost_motions(bag: PairRecording, begin_ns: int, log: Log) -> int:
 def _all(log: Log, kind: type) -> Iterator[Any]:
     for entry in log.messages(topics.BY_TYPE[kind]):
         yield entry.message
+
+
+def _true_places_m(log: Log) -> Floats:
+    """Return where the robot truly was, (n, 2)."""
+    places_m = [(true.pose.x_m, true.pose.y_m) for true in _all(log, TruePose)]
+    return np.array(places_m).reshape(-1, 2)
 
 
 def _topics(log: Log) -> list[Topic]:

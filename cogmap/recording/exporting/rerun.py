@@ -37,6 +37,8 @@ STAMP = "stamp"
 
 ROBOT = "map/robot"
 CAMERA = "map/robot/camera"
+DEPTH = f"{CAMERA}/depth"
+TRUTH = "truth/robot"
 SENSES = (topics.VIEW, topics.SCAN, topics.ODOMETRY, topics.ENERGY)
 OPTICAL_AXES = (-0.5, 0.5, -0.5, 0.5)
 """The turn, a quaternion, from the robot's axes, forward, left and up, to those of its camera:
@@ -127,7 +129,7 @@ class Entities:
         picture = rerun.EncodedImage(contents=encoded.tobytes(), media_type="image/jpeg")
         self._write(f"{CAMERA}/image", picture)
         depth_m = depth(view.depth_m, "the view's depth")
-        self._write(f"{CAMERA}/depth", rerun.DepthImage(depth_m, meter=1.0))
+        self._write(DEPTH, rerun.DepthImage(depth_m, meter=1.0))
 
     def _write_camera(self, camera: Calibration) -> None:
         rerun = self._rerun
@@ -165,7 +167,7 @@ class Entities:
 
     def _write_true_pose(self, true: TruePose) -> None:
         pose = self._transform(true.pose.x_m, true.pose.y_m, true.pose.heading_rad)
-        self._write("truth/robot", pose, self._rerun.TransformAxes3D(AXES_M))
+        self._write(TRUTH, pose, self._rerun.TransformAxes3D(AXES_M))
 
     def _write_sentence(self, said: Sentence) -> None:
         line = self._rerun.TextLog(said.text, level=self._rerun.TextLogLevel.INFO)
