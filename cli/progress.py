@@ -30,6 +30,7 @@ class Pace:
         self._began_s = now_s
         self._round = 1
         self._round_began_s = now_s
+        self._reached_s = now_s
         self.share = 0.0
 
     @property
@@ -43,15 +44,22 @@ class Pace:
         if begins:
             self._round += 1
             self._round_began_s = now_s
+        if share != self.share:
+            self._reached_s = now_s
         self.share = share
         return begins
 
     def line(self, now_s: float) -> str:
-        """Say how far it is, and how long it takes: so far if nothing of it is known to be done."""
+        """Say how far it is, and how long it takes: so far if nothing of it is known to be done.
+
+        The time left is judged by the last step that was done, and runs down until the next one.
+        """
         if self.share <= 0:
             return f"{self.label}: {duration(now_s - self._began_s)} so far"
-        passed_s = now_s - self._round_began_s
-        left_s = passed_s * (1 - min(self.share, 1.0)) / self.share
+        passed_s = self._reached_s - self._round_began_s
+        left_s = passed_s * (1 - min(self.share, 1.0)) / self.share - (now_s - self._reached_s)
+        if left_s <= 0:
+            return f"{self.label}: {self.share:.0%}, {duration(now_s - self._began_s)} so far"
         return f"{self.label}: {self.share:.0%}, {duration(left_s)} left"
 
 

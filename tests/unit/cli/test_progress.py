@@ -33,8 +33,17 @@ def test_work_that_begins_anew_is_another_round_with_a_time_of_its_own() -> None
     pace = Pace("fitting", now_s=0.0)
     pace.reach(1.0, now_s=1000.0)
 
-    assert pace.reach(0.5, now_s=1000.0)
+    assert pace.reach(0.0, now_s=1000.0)
+    assert not pace.reach(0.5, now_s=1010.0)
     assert pace.line(now_s=1010.0) == "fitting, round 2: 50%, 10 s left"
+
+
+def test_the_time_left_runs_down_between_two_steps() -> None:
+    pace = Pace("driving", now_s=0.0)
+    pace.reach(0.5, now_s=60.0)
+
+    assert pace.line(now_s=100.0) == "driving: 50%, 20 s left"
+    assert pace.line(now_s=130.0) == "driving: 50%, 2 min so far"
 
 
 def test_a_log_has_lines_though_nothing_is_said_to_be_done(
