@@ -16,6 +16,7 @@ from cogmap.cli.launch.plan import OBSERVER
 from cogmap.schemas import topics
 from cogmap.schemas.process import Health
 from cogmap.schemas.sensing import MotorCommand, SpeedLimit
+from tests.support.health import report
 
 EXPECTED = ("sim", "epam", "motor")
 SIM = Member("sim", "sim")
@@ -30,23 +31,7 @@ def told(observed: Observed) -> str:
 
 
 def reported(uptime_s: float, ready: bool = True) -> dict[str, list[Health]]:
-    report = Health(
-        module="sim",
-        instance="sim",
-        ready=ready,
-        uptime_s=uptime_s,
-        received={},
-        emitted={},
-        rejected={},
-        superseded={},
-        gaps={},
-        queued=0,
-        busy=0.1,
-        compute_p50_ms=1.0,
-        compute_p99_ms=1.0,
-        memory_mb=50.0,
-    )
-    return {"sim": [report]}
+    return {"sim": [report("sim", uptime_s, ready)]}
 
 
 def test_a_system_that_runs_is_neither_starting_nor_ending() -> None:

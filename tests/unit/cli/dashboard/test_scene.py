@@ -22,10 +22,10 @@ from cogmap.schemas import topics
 from cogmap.schemas.array import Array
 from cogmap.schemas.graph import Delta
 from cogmap.schemas.nodes import Object
-from cogmap.schemas.process import Health
 from cogmap.schemas.sensing import Percepts, TruePose, View
 from cogmap.services.codelets.public import PlanningConfig
 from cogmap.services.global_workspace.config import Config
+from tests.support.health import report
 from tests.support.reference import REFERENCE
 
 SECOND_NS = 10**9
@@ -223,7 +223,7 @@ def test_every_part_is_there_before_the_first_message() -> None:
 def test_a_part_has_another_version_when_something_of_it_has_changed() -> None:
     shown = new_scene()
     before = shown.versions.copy()
-    shown.take(topics.HEALTH, Arrived(_health("epam"), None, 0))
+    shown.take(topics.HEALTH, Arrived(report("epam"), None, 0))
 
     changed = {name for name in PartName if shown.versions[name] != before[name]}
     assert changed == {PartName.SYSTEM, PartName.TOPICS}
@@ -231,8 +231,8 @@ def test_a_part_has_another_version_when_something_of_it_has_changed() -> None:
 
 def test_a_process_that_says_nothing_for_long_is_silent() -> None:
     shown = new_scene()
-    shown.take(topics.HEALTH, Arrived(_health("epam"), None, 0))
-    shown.take(topics.HEALTH, Arrived(_health("motor"), None, 6 * SECOND_NS))
+    shown.take(topics.HEALTH, Arrived(report("epam"), None, 0))
+    shown.take(topics.HEALTH, Arrived(report("motor"), None, 6 * SECOND_NS))
     system = shown.part(PartName.SYSTEM)
 
     assert isinstance(system, parts.SystemPart)
@@ -240,22 +240,3 @@ def test_a_process_that_says_nothing_for_long_is_silent() -> None:
         ("epam", True),
         ("motor", False),
     ]
-
-
-def _health(instance: str) -> Health:
-    return Health(
-        module=instance,
-        instance=instance,
-        ready=True,
-        uptime_s=1.0,
-        received={},
-        emitted={},
-        rejected={},
-        superseded={},
-        gaps={},
-        queued=0,
-        busy=0.5,
-        compute_p50_ms=1.0,
-        compute_p99_ms=2.0,
-        memory_mb=90.0,
-    )
