@@ -1,4 +1,4 @@
-"""Keys pause a replay, and step through it, where there is a terminal."""
+"""Keys pause a replay or a recording, and step through it, where there is a terminal."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ import sys
 import termios
 import tty
 from collections.abc import Iterator
+from types import FrameType
+from typing import Self
 
 import click
 
 from cogmap.runtime.process import Stop
 
-PAUSED = "paused: space continues, s goes on by a view"
-
 
 class Keys:
     """Waits for time to pass, for a signal, and, on a terminal, for keys: the space bar pauses and
-    continues, `s` goes on by a view.
+    continues.
     """
+
+    told_paused = "paused: space continues"
 
     def __init__(self, stop: Stop, paused: bool) -> None:
         self._stop = stop
         self.paused = paused
-        self._steps = 0
         self._wakes: list[socket.socket] = []
 
     @property
@@ -36,7 +37,7 @@ class Keys:
         return self._stop.asked
 
     @contextlib.contextmanager
-    def listening(self) -> Iterator[Keys]:
+    def listening(self) -> Iterator[Self]:
         """Read single keys from the terminal until left; none if standard input is no terminal.
 
         Raises UsageError if it is to begin paused and there is no terminal.
@@ -64,13 +65,6 @@ class Keys:
             for end in self._wakes:
                 end.close()
 
-    def take_step(self) -> bool:
-        """Return whether it is asked to go on for a view; each wish once."""
-        if not self._steps:
-            return False
-        self._steps -= 1
-        return True
-
     def wait(self, timeout_s: float) -> bool:
         """Wait so long, or until asked to end, to pause or to continue. Returns whether to end."""
         if not self._wakes:
@@ -79,13 +73,70 @@ class Keys:
         terminal = sys.stdin.fileno()
         ready, _, _ = select.select([terminal, self._wakes[0]], [], [], timeout_s)
         if terminal in ready:
-            self._press(os.read(terminal, 64))
+            self.press(os.read(terminal, 64))
         return self._stop.asked
 
-    def _press(self, keys: bytes) -> None:
-        """Do what keys mean: a step pauses too."""
+    def press(self, keys: bytes) -> None:
+        """Do what keys mean."""
+        if b" " in keys:
+            self.toggle()
+
+    def toggle(self) -> None:
+        """Pause, or continue, and say so."""
+        self.paused = not self.paused
+        click.echo(self.told_paused if self.paused else "continuing", err=True)
+
+
+class ReplayKeys(Keys):
+    """Goes on by a view at `s`, too, and pauses there."""
+
+    told_paused = "paused: space continues, s goes on by a view"
+
+    def __init__(self, stop: Stop, paused: bool) -> None:
+        super().__init__(stop, paused)
+        self._steps = 0
+
+    def take_step(self) -> bool:
+        """Return whether it is asked to go on for a view; each wish once."""
+        if not self._steps:
+            return False
+        self._steps -= 1
+        return True
+
+    def press(self, keys: bytes) -> None:
+        """Do what keys mean."""
         steps = keys.count(b"s")
         if b" " in keys or (steps and not self.paused):
-            self.paused = not self.paused
-            click.echo(PAUSED if self.paused else "continuing", err=True)
+            self.toggle()
         self._steps += steps
+
+
+class RecordKeys(Keys):
+    """Takes a snapshot at `s`, too, and at the signal USR1, for a recorder without a terminal."""
+
+    def __init__(self, stop: Stop, paused: bool) -> None:
+        super().__init__(stop, paused)
+        self._wants_snapshot = False
+
+    @contextlib.contextmanager
+    def signalled(self) -> Iterator[None]:
+        """Take a snapshot at each USR1 until left."""
+        before = signal.signal(signal.SIGUSR1, self._on_signal)
+        try:
+            yield
+        finally:
+            signal.signal(signal.SIGUSR1, before)
+
+    def take_snapshot(self) -> bool:
+        """Return whether a snapshot is asked for; each wish once."""
+        wanted = self._wants_snapshot
+        self._wants_snapshot = False
+        return wanted
+
+    def press(self, keys: bytes) -> None:
+        """Do what keys mean."""
+        super().press(keys)
+        self._wants_snapshot |= b"s" in keys
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        self._wants_snapshot = True

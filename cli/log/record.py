@@ -16,11 +16,11 @@ from cogmap.cli.log.choosing import (
     exclude_option,
     regex_option,
 )
+from cogmap.cli.log.keys import RecordKeys
 from cogmap.cli.log.report import print_summary
 from cogmap.cli.options import FiniteRange, json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.topic.argument import topics_argument
-from cogmap.errors import LogError
 from cogmap.recording import recorder, selection
 from cogmap.runtime import config
 from cogmap.runtime.process import Stop, give_way
@@ -39,6 +39,7 @@ Examples:
   cogmap log record odometry motor/command   two topics
   cogmap log record -e '^workspace/'         what the workspace publishes
   cogmap log record -o drive.mcap --split-s 600    drive.mcap, drive-2.mcap ...
+  cogmap log record -o fall.mcap --snapshot-s 30   the last half minute, whenever s is pressed
 """
 
 
@@ -71,6 +72,14 @@ Examples:
     metavar="MB",
     help="Begin another file once one has so many megabytes.",
 )
+@click.option(
+    "--snapshot-s",
+    type=FiniteRange(min=0, min_open=True),
+    metavar="SECONDS",
+    help="Write nothing but the last so many seconds, at most 256 MB, into OUTPUT, OUTPUT-2 ... "
+    "whenever s is pressed, or by `kill -USR1`.",
+)
+@click.option("--start-paused", is_flag=True, help="Begin paused; the space bar continues.")
 @compression_option
 @click.option(
     "--instance",
@@ -93,6 +102,8 @@ def record(
     max_duration: float | None,
     split_s: float | None,
     split_mb: float | None,
+    snapshot_s: float | None,
+    start_paused: bool,
     compression: str,
     instance: str,
     tied: bool,
@@ -104,41 +115,62 @@ def record(
 ) -> None:
     """Record the messages on the bus into an MCAP file, until Ctrl-C.
 
+    On a terminal the space bar pauses and continues; what comes meanwhile is counted.
+
     The file is written four times a second: killing the recorder loses at most 0.25 s. At the end
     the missing messages of each publisher are printed, and noted in the file. The file also holds
     the configuration, which `cogmap log replay` uses. Of a recording that was split, `cogmap log
-    merge` makes one log again: a graph, and a replay into modules, need it from its beginning.
+    merge` makes one log again: a graph, and a replay into modules, need it from its beginning and
+    without a pause.
     """
     if everything and (topics or regex):
         raise click.UsageError("--all records every topic: leave it out, or the choice of topics")
+
+    if snapshot_s and (split_s or split_mb):
+        raise click.UsageError(
+            "--snapshot-s makes files of its own: leave --split-s and --split-mb out"
+        )
 
     chosen = selection.to_record(topics, regex, exclude)
     about = {"agent": agent, "config": json.dumps(config.load(config_path, settings))}
     path = output or Path(f"cogmap_{time.strftime('%Y_%m_%d-%H_%M_%S')}.mcap")
 
     bus = ZenohBus(connect, agent)
-    stop = Stop(tied)  # only now: until a router answers, Ctrl-C ends the process at once
+    keys = RecordKeys(Stop(tied), start_paused)  # only now: until a router answers, Ctrl-C ends it
     try:
-        recording = recorder.Recorder(
-            bus,
-            path,
-            chosen,
-            about,
-            instance=instance,
-            compression=COMPRESSIONS[compression],
-            split=recorder.Split(
-                max_s=split_s or math.inf,
-                max_bytes=1e6 * (split_mb or math.inf),
-            ),
-        )
-    except LogError:
+        with keys.listening(), keys.signalled():
+            recording = recorder.Recorder(
+                bus,
+                path,
+                chosen,
+                about,
+                instance=instance,
+                compression=COMPRESSIONS[compression],
+                split=recorder.Split(
+                    max_s=split_s or math.inf,
+                    max_bytes=1e6 * (split_mb or math.inf),
+                ),
+                snapshot_s=snapshot_s,
+            )
+            if tied:
+                give_way()
+            summary = recorder.run(recording, lambda: _ends(recording, keys), max_duration)
+    finally:
         bus.close()
-        raise
 
-    if tied:
-        give_way()
-    summary = recorder.run(recording, lambda: stop.asked, max_duration)
     if as_json:
         print_json(summary)
     else:
         print_summary(summary)
+
+
+def _ends(recording: recorder.Recorder, keys: RecordKeys) -> bool:
+    """Do what keys ask for. Return whether to end."""
+    keys.wait(0.0)
+    recording.is_paused = keys.paused
+    if keys.take_snapshot():
+        if recording.takes_snapshots:
+            click.echo(f"wrote {recording.snapshot()}", err=True)
+        else:
+            click.echo("all is recorded: --snapshot-s writes only what is asked for", err=True)
+    return keys.asked

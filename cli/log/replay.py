@@ -16,7 +16,7 @@ from cogmap.cli.log.choosing import (
     start_option,
     until_option,
 )
-from cogmap.cli.log.keys import Keys
+from cogmap.cli.log.keys import ReplayKeys
 from cogmap.cli.options import FiniteRange, json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.progress import bar
@@ -136,7 +136,8 @@ def replay(
     reader = LogReader(log)
     bus = ZenohBus(connect, agent)
     try:
-        with Keys(Stop(), start_paused).listening() as keys, bar(f"playing {log}") as progress:
+        keys = ReplayKeys(Stop(), start_paused)
+        with keys.listening(), bar(f"playing {log}") as progress:
             played = Player(reader, bus, choices, keys).play(progress)
     finally:
         bus.close()

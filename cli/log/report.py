@@ -23,6 +23,10 @@ REPLAY_COLUMNS = ("instance:", "life", "inputs", "same", "different", "missing",
 def print_summary(summary: Summary) -> None:
     """Print how many messages a recording has, and which it lacks."""
     number = sum(summary.messages.values())
+    if not summary.paths:
+        click.echo(f"{summary.path}: nothing, as nobody asked for a snapshot: press s")
+        return
+
     click.echo(
         f"{summary.path}: {number} messages on {len(summary.messages)} topics in "
         f"{summary.duration_s:.1f} s, {megabytes(summary.size_bytes)}"
@@ -36,6 +40,10 @@ def print_summary(summary: Summary) -> None:
         click.echo("No gap in any NEVER_DROP topic.")
     for sentence in summary.gaps:
         click.echo(f"gap: {sentence}")
+
+    left_out = sum(summary.left_out.values())
+    if left_out:
+        click.echo(f"{left_out} messages left out: it was paused, or no snapshot went back so far.")
 
     losses = {
         "given up by the bus": summary.unrecovered,

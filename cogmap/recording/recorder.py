@@ -16,9 +16,10 @@ from mcap.writer import CompressionType
 from cogmap.bus.interface import Arrival, Bus, Member
 from cogmap.errors import LogError
 from cogmap.recording.storage import format as layout
+from cogmap.recording.storage.recent import Recent
 from cogmap.recording.storage.sequences import SequenceTracker
 from cogmap.recording.storage.write_queue import LIMIT_BYTES, WriteQueue
-from cogmap.recording.storage.writer import FlushTimer, LogWriter
+from cogmap.recording.storage.writer import FlushTimer, LogWriter, check_new
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.schemas.topics import BY_NAME, Delivery, Topic
 
@@ -34,8 +35,9 @@ class Summary(msgspec.Struct, kw_only=True):
     `lost`: missing by the sources' numbers; `unrecovered`: given up by the bus; `dropped`: found no
     room here; `rejected`: were no messages of their topic. `gaps` are sentences;
     `never_drop_whole`: no NEVER_DROP topic misses any. `queue_peak_mb` is the most that ever waited
-    to be written. `paths` are the files, more than one if the recording was split: each file has
-    the summary of all that was recorded until its end.
+    to be written. `left_out` were received and not written: while it was paused, or earlier than a
+    snapshot goes back. `paths` are the files, more than one if the recording was split and one for
+    each snapshot: each file has the summary of all that was recorded until its end.
     """
 
     path: str
@@ -49,6 +51,7 @@ class Summary(msgspec.Struct, kw_only=True):
     gaps: list[str]
     never_drop_whole: bool
     queue_peak_mb: float = 0.0
+    left_out: dict[str, int] = {}
     paths: list[str] = []
 
 
@@ -69,7 +72,9 @@ class Recorder:
 
     `about` is kept in the file: the agent, the configuration, what else is to be known of the run.
     `limit_bytes` may wait to be written. Where the recording is `split`, files follow whose names
-    have a number, such as `drive-2.mcap`. Raises LogError if the file cannot be written.
+    have a number, such as `drive-2.mcap`. With `snapshot_s` nothing is written but what a
+    `snapshot()` finds: the messages of the last `snapshot_s`, at most `limit_bytes` of them, in a
+    file of its own. Raises LogError if the file cannot be written.
     """
 
     def __init__(
@@ -83,6 +88,7 @@ class Recorder:
         instance: str = MODULE,
         compression: CompressionType = CompressionType.LZ4,
         split: Split = WHOLE,
+        snapshot_s: float | None = None,
     ) -> None:
         self._bus = bus
         self._topics = topics
@@ -90,25 +96,40 @@ class Recorder:
         self._instance = instance
         self._compression = compression
         self._split = split
-        self._paths = [path]
+        self._path = path
+        self._paths: list[Path] = []
         self._size_bytes = 0
-        self._writer = self._opened(path)
+        self._recent: Recent | None = None
+        self._writer: LogWriter | None = None
+        if snapshot_s is None:
+            self._writer = self._opened()
+        else:
+            check_new(path)
+            self._recent = Recent(snapshot_s, limit_bytes)
+        self.is_paused = False
         self._queue = WriteQueue(limit_bytes)
         self._intake = Intake()
         self._flush_timer = FlushTimer()
         self._sequences = SequenceTracker(since_ns=time.time_ns())
         self._unrecovered: Counter[str] = Counter()
+        self._written: Counter[str] = Counter()
+        self._left_out: Counter[str] = Counter()
         self._began_s = self._part_began_s = time.monotonic()
 
     @property
     def path(self) -> Path:
-        """Return the file that it writes, the first of a split recording."""
-        return self._paths[0]
+        """Return the file that it writes, the first of several."""
+        return self._path
+
+    @property
+    def takes_snapshots(self) -> bool:
+        """Return whether only snapshots are written."""
+        return self._recent is not None
 
     @property
     def received(self) -> Counter[str]:
         """Return how many messages of each topic have been written."""
-        return self._intake.received
+        return self._written
 
     def open(self) -> None:
         """Join the bus and announce itself: all that is published from now on is recorded."""
@@ -132,42 +153,66 @@ class Recorder:
         """Write out what has been received, and begin another file if this one is as large, or as
         old, as one may be. Raises LogError if the disk takes no more.
         """
-        self._writer.flush()
         self._flush_timer.reset()
+        if self._writer is None:
+            return
+
+        self._writer.flush()
         age_s = time.monotonic() - self._part_began_s
         if age_s >= self._split.max_s or self._writer.size_bytes >= self._split.max_bytes:
-            self._begin_part()
+            self._finish(self._writer)
+            self._writer = self._opened()
+            self._part_began_s = time.monotonic()
+
+    def snapshot(self) -> Path:
+        """Write the messages of the last seconds into a new file, and return its path; they are in
+        no later one. Raises LogError if the disk takes no more.
+        """
+        assert self._recent is not None
+        writer = self._opened()
+        for arrival in self._recent.take_all():
+            self._write(writer, arrival)
+        self._finish(writer)
+        return writer.path
 
     def close(self) -> Summary:
         """Leave the bus, write what waits, and finish the file. Raises LogError."""
         self._bus.close()
         while self._take(0.0):
             pass
-        return self._finish()
+        if self._writer is None:
+            return self._summary()
+        return self._finish(self._writer)
 
-    def _opened(self, path: Path) -> LogWriter:
+    def _opened(self) -> LogWriter:
+        """Begin a file: the first by the name that was given, others with a number."""
+        path = self._path
+        if self._paths:
+            path = path.with_stem(f"{path.stem}-{len(self._paths) + 1}")
         facts = {"began_ns": str(time.time_ns()), **self._about}
-        return LogWriter(path, self._topics, facts, self._compression)
-
-    def _begin_part(self) -> None:
-        """Finish this file, and begin another."""
-        self._finish()
-        path = self.path.with_stem(f"{self.path.stem}-{len(self._paths) + 1}")
-        self._writer = self._opened(path)
+        writer = LogWriter(path, self._topics, facts, self._compression)
         self._paths.append(path)
-        self._part_began_s = time.monotonic()
+        return writer
 
-    def _finish(self) -> Summary:
+    def _finish(self, writer: LogWriter) -> Summary:
         """Finish a file. Returns the summary of the recording until now, which is noted in it."""
+        summary = self._summary()
+        writer.note(layout.SUMMARY, {"json": msgspec.json.encode(summary).decode()})
+        writer.close()
+        self._size_bytes += writer.path.stat().st_size
+        summary.size_bytes = self._size_bytes
+        return summary
+
+    def _summary(self) -> Summary:
         lost = self._sequences.lost()
         dropped = dict(self._queue.dropped)
         incomplete = {*lost, *dropped, *self._unrecovered}
         never_drop = [name for name in incomplete if BY_NAME[name].delivery is Delivery.NEVER_DROP]
-        summary = Summary(
+        return Summary(
             path=str(self.path),
             duration_s=time.monotonic() - self._began_s,
-            size_bytes=0,
-            messages=dict(self._intake.received),
+            size_bytes=self._size_bytes,
+            messages=dict(self._written),
             lost=lost,
             unrecovered=dict(self._unrecovered),
             dropped=dropped,
@@ -175,13 +220,9 @@ class Recorder:
             gaps=self._sequences.gaps(),
             never_drop_whole=not never_drop,
             queue_peak_mb=self._queue.peak_bytes / 1e6,
+            left_out=dict(self._left_out),
             paths=[str(path) for path in self._paths],
         )
-        self._writer.note(layout.SUMMARY, {"json": msgspec.json.encode(summary).decode()})
-        self._writer.close()
-        self._size_bytes += self._writer.path.stat().st_size
-        summary.size_bytes = self._size_bytes
-        return summary
 
     def abandon(self) -> None:
         """Leave the bus and write no more: the disk took no more."""
@@ -204,7 +245,8 @@ class Recorder:
         }
 
         def note() -> None:
-            self._writer.note(layout.MEMBER, {**facts, "at_ns": str(time.time_ns())})
+            if self._writer is not None:
+                self._writer.note(layout.MEMBER, {**facts, "at_ns": str(time.time_ns())})
 
         self._queue.call(note)
 
@@ -218,11 +260,22 @@ class Recorder:
             return True
 
         message = self._intake.accept(item)
-        envelope = item.envelope
-        if message is not None and envelope is not None:
-            self._sequences.follow(item.topic, envelope)
-            self._writer.write(item.topic, item.payload, envelope, item.received_ns)
+        if message is not None and item.envelope is not None:
+            self._sequences.follow(item.topic, item.envelope)
+            self._store(item)
         return True
+
+    def _store(self, arrival: Arrival) -> None:
+        if self.is_paused:
+            self._left_out[arrival.topic.name] += 1
+        elif self._writer is not None:
+            self._write(self._writer, arrival)
+        elif self._recent is not None:
+            self._left_out.update(gone.topic.name for gone in self._recent.put(arrival))
+
+    def _write(self, writer: LogWriter, arrival: Arrival) -> None:
+        writer.write(arrival.topic, arrival.payload, arrival.envelope, arrival.received_ns)
+        self._written[arrival.topic.name] += 1
 
 
 def run(

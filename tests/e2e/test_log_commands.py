@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pty
+import signal
 import subprocess
 import sys
 import threading
@@ -16,9 +18,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from cogmap.bus.interface import Member
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import UsageError
 from cogmap.recording.diff import diff
+from cogmap.recording.info import info
 from cogmap.recording.recorder import Recorder
 from cogmap.recording.storage.format import topics_to_record
 from cogmap.schemas.array import Array
@@ -26,7 +30,7 @@ from cogmap.schemas.base import Message
 from cogmap.testing import odometry
 from tests.support.logs import SECOND_NS, scan, write_log
 from tests.support.system.commands import log_command, log_facts
-from tests.support.system.networks import routed
+from tests.support.system.networks import await_members, routed
 
 COUNT = 5
 TIMEOUT_S = 30.0
@@ -227,3 +231,47 @@ def test_the_space_bar_continues_a_replay_that_began_paused(
 
     os.close(terminal)
     os.close(other)
+
+
+def test_a_signal_makes_a_recorder_write_a_snapshot(endpoint: str, tmp_path: Path) -> None:
+    output = tmp_path / "snapshot.mcap"
+    command = [*REPLAY[:-1], "record", "-o", str(output), "--snapshot-s", "60", "--json"]
+    with (
+        contextlib.closing(ZenohBus(endpoint, AGENT)) as bus,
+        subprocess.Popen(
+            [*command, "--connect", endpoint, "--agent", AGENT],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        ) as recorder,
+    ):
+        await_members(bus, Member("recorder", "recorder"))
+        assert not output.exists()
+
+        recorder.send_signal(signal.SIGUSR1)
+        assert recorder.stderr is not None
+        assert any(f"wrote {output}" in line for line in recorder.stderr)
+
+        recorder.send_signal(signal.SIGTERM)
+        written, _ = recorder.communicate(timeout=TIMEOUT_S)
+
+    assert recorder.returncode == 0
+    assert json.loads(written)["paths"] == [str(output)]
+    assert info(output).finished
+
+
+def test_a_recorder_that_begins_paused_needs_a_terminal(endpoint: str, tmp_path: Path) -> None:
+    output = tmp_path / "paused.mcap"
+    result = subprocess.run(
+        [*REPLAY[:-1], "record", "-o", str(output), "--start-paused", "--connect", endpoint],
+        check=False,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=TIMEOUT_S,
+    )
+
+    assert result.returncode == 2
+    assert "--start-paused needs a terminal" in result.stderr
+    assert not output.exists()

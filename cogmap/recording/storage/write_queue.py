@@ -30,7 +30,7 @@ class WriteQueue:
 
     def put(self, arrival: Arrival) -> None:
         """Enqueue; called from the bus's threads."""
-        size = _size(arrival)
+        size = size_bytes(arrival)
         never_drop = arrival.topic.delivery is Delivery.NEVER_DROP
         room = self._limit_bytes if never_drop else self._limit_bytes // 2
 
@@ -61,9 +61,10 @@ class WriteQueue:
 
             item = self._waiting.popleft()
             if isinstance(item, Arrival):
-                self._bytes -= _size(item)
+                self._bytes -= size_bytes(item)
             return item
 
 
-def _size(arrival: Arrival) -> int:
+def size_bytes(arrival: Arrival) -> int:
+    """Return about how much memory an arrival takes."""
     return len(arrival.payload) + _OVERHEAD_BYTES

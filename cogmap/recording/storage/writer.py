@@ -175,9 +175,19 @@ def open_new(path: Path) -> BinaryIO:
     try:
         return path.open("xb")
     except FileExistsError:
-        raise LogError(f"{path} exists already: remove it, or name another file") from None
+        raise _exists(path) from None
     except OSError as error:
         raise cannot_write(path, error) from None
+
+
+def check_new(path: Path) -> None:
+    """Raise LogError if there is a file that one which is written later would replace."""
+    if path.exists():
+        raise _exists(path)
+
+
+def _exists(path: Path) -> LogError:
+    return LogError(f"{path} exists already: remove it, or name another file")
 
 
 def cannot_write(path: Path, error: OSError) -> LogError:

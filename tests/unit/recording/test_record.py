@@ -26,12 +26,24 @@ from tests.support.logs import scan
 class Recorded:
     """A network with a recorder on it, and a bus to publish on."""
 
-    def __init__(self, path: Path, limit_bytes: int = 2**20, split: Split = WHOLE) -> None:
+    def __init__(
+        self,
+        path: Path,
+        limit_bytes: int = 2**20,
+        split: Split = WHOLE,
+        snapshot_s: float | None = None,
+    ) -> None:
         self.network = MemoryNetwork()
         self.bus = MemoryBus(self.network)
         about = {"agent": "a", "config": "{}"}
         self.recorder = Recorder(
-            MemoryBus(self.network), path, to_record(), about, limit_bytes=limit_bytes, split=split
+            MemoryBus(self.network),
+            path,
+            to_record(),
+            about,
+            limit_bytes=limit_bytes,
+            split=split,
+            snapshot_s=snapshot_s,
         )
         self.recorder.open()
 
@@ -43,6 +55,10 @@ class Recorded:
 
     def publish_bytes(self, topic: topics.Topic, payload: bytes, envelope: Envelope) -> None:
         self.bus.publish(topic, payload, envelope)
+
+    def pump_all(self) -> None:
+        while self.recorder.pump():
+            pass
 
     def end(self) -> Summary:
         return self.recorder.close()
@@ -281,3 +297,69 @@ def test_a_file_that_is_large_enough_is_the_last_but_one(path: Path) -> None:
     recorded.recorder.flush()
 
     assert path.with_name("log-2.mcap").exists()
+
+
+def test_messages_that_come_during_a_pause_are_left_out_and_counted(path: Path) -> None:
+    recorded = Recorded(path)
+    for number, is_paused in enumerate((False, True, True, False)):
+        recorded.recorder.is_paused = is_paused
+        recorded.publish(odometry(number), 1 + number)
+        recorded.pump_all()
+    summary = recorded.end()
+
+    assert [record.sequence for record in LogReader(path).records()] == [0, 3]
+    assert summary.messages == {"odometry": 2}
+    assert summary.left_out == {"odometry": 2}
+    assert summary.lost == {}
+
+
+def recorded_seconds(recorded: Recorded, seconds: range) -> None:
+    """Publish and receive a message in each of those seconds."""
+    for second in seconds:
+        recorded.publish(odometry(second), second * 10**9)
+        recorded.pump_all()
+
+
+def test_a_snapshot_has_the_last_seconds_and_the_next_one_what_came_after(path: Path) -> None:
+    recorded = Recorded(path, snapshot_s=3.0)
+    recorded_seconds(recorded, range(10))
+    assert not path.exists()
+
+    first = recorded.recorder.snapshot()
+    recorded_seconds(recorded, range(10, 12))
+    second = recorded.recorder.snapshot()
+    summary = recorded.end()
+
+    assert (first, second) == (path, path.with_name("log-2.mcap"))
+    assert [record.sequence for record in LogReader(first).records()] == [6, 7, 8, 9]
+    assert [record.sequence for record in LogReader(second).records()] == [10, 11]
+    assert summary.paths == [str(first), str(second)]
+    assert summary.messages == {"odometry": 6}
+    assert summary.left_out == {"odometry": 6}
+    assert info(first).finished
+
+
+def test_a_snapshot_keeps_the_newest_messages_that_memory_has_room_for(path: Path) -> None:
+    recorded = Recorded(path, limit_bytes=8000, snapshot_s=1e6)
+    recorded_seconds(recorded, range(100))
+    snapshot = recorded.recorder.snapshot()
+
+    numbers = [record.sequence for record in LogReader(snapshot).records()]
+    assert 2 <= len(numbers) < 10
+    assert numbers == list(range(100 - len(numbers), 100))
+
+
+def test_without_a_snapshot_there_is_no_file(path: Path) -> None:
+    recorded = Recorded(path, snapshot_s=3.0)
+    recorded_seconds(recorded, range(3))
+    summary = recorded.end()
+
+    assert summary.paths == []
+    assert list(path.parent.iterdir()) == []
+
+
+def test_a_snapshot_never_overwrites_a_file(path: Path) -> None:
+    path.write_text("precious")
+
+    with pytest.raises(LogError, match="exists already"):
+        Recorded(path, snapshot_s=3.0)
