@@ -1,4 +1,6 @@
-"""Our stereo matching against plain StereoSGBM, on a rectified pair of a user's own."""
+"""Our stereo matching against plain StereoSGBM that is padded as ours is, on a rectified pair of a
+user's own.
+"""
 
 from __future__ import annotations
 
@@ -98,8 +100,8 @@ def unmatched(found_px: Singles, true_px: Singles) -> float:
 
 
 def plain_sgbm(left: Bytes, right: Bytes, most_px: float) -> Singles:
-    """Match grey images by StereoSGBM as OpenCV's documentation sets it up. Returns disparities,
-    float32 (h, w), 0 unmatched.
+    """Match grey images by StereoSGBM as OpenCV's documentation sets it up, padded so that it
+    matches the left border, too. Returns disparities, float32 (h, w), 0 unmatched.
     """
     left_grey = np.asarray(cv2.cvtColor(left, cv2.COLOR_RGB2GRAY), np.uint8)
     right_grey = np.asarray(cv2.cvtColor(right, cv2.COLOR_RGB2GRAY), np.uint8)
@@ -109,9 +111,10 @@ def plain_sgbm(left: Bytes, right: Bytes, most_px: float) -> Singles:
 def plain_disparity_px(left: Bytes, right: Bytes, most_px: float) -> Singles:
     """Return what `plain_sgbm` does, of grey images (h, w)."""
     area = PLAIN_BLOCK_PX**2
+    disparities = max(16, 16 * math.ceil(most_px / 16))
     matcher = cv2.StereoSGBM.create(
         minDisparity=0,
-        numDisparities=max(16, 16 * math.ceil(most_px / 16)),
+        numDisparities=disparities,
         blockSize=PLAIN_BLOCK_PX,
         P1=8 * area,
         P2=32 * area,
@@ -120,7 +123,9 @@ def plain_disparity_px(left: Bytes, right: Bytes, most_px: float) -> Singles:
         speckleWindowSize=100,
         speckleRange=32,
     )
-    steps = matcher.compute(left, right)
+    padding = (0, 0, disparities, 0)
+    padded = [cv2.copyMakeBorder(grey, *padding, cv2.BORDER_REPLICATE) for grey in (left, right)]
+    steps = matcher.compute(*padded)[:, disparities:]
 
     matched = np.maximum(steps, 0).astype(np.float32)
     return matched / np.float32(STEPS_PER_PIXEL)

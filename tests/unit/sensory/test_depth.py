@@ -10,7 +10,7 @@ import pytest
 
 from cogmap.errors import MessageError
 from cogmap.schemas.sensing import Calibration
-from cogmap.services.sensory.disparity import DepthFromStereo
+from cogmap.services.sensory.disparity import DepthFromStereo, refined
 from cogmap.services.sensory.rectify import rectification
 from cogmap.services.sensory.scan import scan
 
@@ -225,3 +225,17 @@ def test_a_wrong_match_or_two_are_no_obstacle() -> None:
 
     _, range_m = scan(depth_m, CALIBRATION)
     assert range_m[range_m > 0].min() > 15
+
+
+def test_where_two_surfaces_meet_the_disparity_stays_as_it_was_matched() -> None:
+    left, right = (image[..., 0].astype(np.float32) for image in _wall(10.0))
+    matched_px = np.full(SHAPE, 10.2, np.float32)
+    matched_px[:, WIDTH // 2 :] = 30.0
+    near_the_edge = np.s_[:, WIDTH // 2 - 4 : WIDTH // 2 + 4]
+
+    refined_px = refined(matched_px, left, right)
+
+    assert np.array_equal(refined_px[near_the_edge], matched_px[near_the_edge])
+    true_px = FOCAL_PX * BASELINE_M / 10.0
+    on_the_wall_px = refined_px[20:-20, 60 : WIDTH // 2 - 10]
+    assert np.median(np.abs(on_the_wall_px - true_px)) < abs(10.2 - true_px) / 2
