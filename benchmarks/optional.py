@@ -23,6 +23,16 @@ def gtsam() -> Any:
     return gtsam
 
 
+def pfilter() -> Any:
+    """Load pfilter, which has no types. Raises UsageError if it is not installed."""
+    try:
+        import pfilter  # type: ignore[import-untyped]
+    except ImportError:
+        raise UsageError(f"pfilter {REMEDY}") from None
+
+    return pfilter.pfilter
+
+
 def scikit_learn() -> Any:
     """Load scikit-learn, which has no types. Raises UsageError if it is not installed."""
     try:

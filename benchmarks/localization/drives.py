@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.localization import smoother
+from benchmarks.localization import particle_filter, smoother
 from benchmarks.localization.loop import Landmarks, LocalizationLoop
 from benchmarks.localization.senses import Moment, label_of, moments
 from benchmarks.localization.truth import Truth
@@ -23,6 +23,7 @@ STAMP_COLUMN = 0
 POSE_COLUMNS = slice(1, 4)
 ODOMETRY_COLUMNS = slice(4, 7)
 STAMP_TOLERANCE_S = 1e-6
+FILTER_KEY = "filter_rmse_m"
 
 
 class Drive(NamedTuple):
@@ -91,7 +92,8 @@ def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics
     """Return the errors of one robot, each the mean over SEEDS.
 
     `slam_rmse_m` is of the path as the map has it in the end, as the smoother's is;
-    `slam_online_rmse_m` of the estimate at each moment, before later observations corrected it.
+    `slam_online_rmse_m` of the estimate at each moment, before later observations corrected it, as
+    `isam2_rmse_m` is. `filter_rmse_m_0` and so on are of the particle filter by its SCALES.
     `*_even_m` is of the moments at even times alone.
     """
     log = list(moments(robot))
@@ -99,21 +101,29 @@ def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics
     truth = Truth.at(robot, stamps_s)
     even = truth.only(np.array([moment.tick for moment in log]))
     start_x_m, start_y_m, start_rad = Truth.at(robot, robot.odometry[:1, 0]).poses[0].tolist()
+    start = (start_x_m, start_y_m, start_rad)
+    surveyed = {label_of(subject): where for subject, where in landmarks.items()}
 
     known = []
     mapping = []
     for seed in SEEDS:
-        known.append(follow(log, landmarks, (start_x_m, start_y_m, start_rad), seed).online)
+        known.append(follow(log, landmarks, start, seed).online)
         mapping.append(follow(log, {}, ORIGIN, seed))
 
     in_the_end_m = [truth.aligned_error_m(drive.corrected(stamps_s)) for drive in mapping]
     online_m = [truth.aligned_error_m(drive.online) for drive in mapping]
-    return {
+    errors: Metrics = {
         "known_map_rmse_m": float(np.mean([truth.rmse_m(path) for path in known])),
         "known_map_rmse_even_m": float(np.mean([even.rmse_m(path) for path in known])),
         "slam_rmse_m": float(np.mean(in_the_end_m)),
         "slam_online_rmse_m": float(np.mean(online_m)),
         "path_integration_rmse_m": truth.aligned_error_m(mapping[0].odometry),
         "smoother_rmse_m": truth.aligned_error_m(smoother.smooth(log)),
+        "isam2_rmse_m": truth.aligned_error_m(smoother.smooth_online(log)),
         "late_answers": float(sum(drive.late_answers for drive in mapping)),
     }
+
+    for number, scales in enumerate(particle_filter.SCALES):
+        filtered = particle_filter.localize(log, surveyed, start, scales, SEEDS[0])
+        errors[f"{FILTER_KEY}_{number}"] = truth.rmse_m(filtered)
+    return errors

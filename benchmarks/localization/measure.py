@@ -11,9 +11,9 @@ import numpy as np
 
 from benchmarks import optional
 from benchmarks.benchmark import PROCESSES, Setting, path_option
-from benchmarks.localization import beacons, speed, without_names
+from benchmarks.localization import beacons, left_out, particle_filter, speed, without_names
 from benchmarks.localization import trees as tree_drive
-from benchmarks.localization.drives import evaluate
+from benchmarks.localization.drives import FILTER_KEY, evaluate
 from benchmarks.localization.recovery import evaluate_recovery
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
@@ -27,12 +27,14 @@ THRESHOLDS = {
     "slam_rmse_m": at_most(0.25),
     "slam_online_rmse_m": at_most(0.22),
     "slam_vs_smoother": at_most(1.2),
+    "slam_online_over_isam2": at_most(1.1),
+    "known_map_over_filter": at_most(1.0),
     "update_ms_p99": at_most(1.5),
     "update_and_landmarks_ms_p99": at_most(4.0),
     "map_size_ratio": at_most(1.2),
     "recovery_s": at_most(15.0),
     "recovery_worst_s": at_most(60.0),
-}
+} | left_out.THRESHOLDS
 OPTION_THRESHOLDS = without_names.THRESHOLDS | tree_drive.THRESHOLDS | beacons.THRESHOLDS
 OPTIONS = (
     path_option(
@@ -60,6 +62,7 @@ OPTIONS = (
     ),
     PROCESSES,
 )
+FILTERS = len(particle_filter.SCALES)
 OF_EACH_ROBOT = ("known_map_rmse_m", "slam_rmse_m", "smoother_rmse_m")
 
 
@@ -76,7 +79,8 @@ def measure(
 
     Each of the set's robots alone, through the town's workspace and codelets; observations of other
     robots are left out. The map that it makes is aligned with the truth, and compared with gtsam's
-    batch smoother, which `make bench-setup` installs. Takes some minutes. --trees, --ranges and
+    batch smoother and with its iSAM2, localization on the known map with the particle filter of
+    pfilter: `make bench-setup` installs them. Takes most of an hour. --trees, --ranges and
     --without-names measure maps alone, beside gtsam's or beside those with names.
     """
     if is_without_names and folder is None:
@@ -107,6 +111,7 @@ def _measure_without_names(setting: Setting, folder: Path) -> Metrics:
 
 def _measure_robots(setting: Setting, folder: Path) -> Metrics:
     optional.gtsam()
+    optional.pfilter()
     recording = read(folder)
     timings = speed.measure()
 
@@ -118,7 +123,16 @@ def _measure_robots(setting: Setting, folder: Path) -> Metrics:
         work = partial(evaluate_recovery, landmarks=recording.landmarks)
         recoveries = parallel_map(work, recording.robots, setting.processes, progress)
 
+    with bar("constants that others choose") as progress:
+        candidate = partial(left_out.evaluate_candidate, landmarks=recording.landmarks)
+        errors_m = parallel_map(candidate, left_out.jobs(recording), setting.processes, progress)
+
     metrics = _means(rows)
+    filtered_m = [metrics.pop(f"{FILTER_KEY}_{number}") for number in range(FILTERS)]
+    metrics[FILTER_KEY] = min(filtered_m)
+    metrics["known_map_over_filter"] = metrics["known_map_rmse_m"] / metrics[FILTER_KEY]
+    metrics["slam_online_over_isam2"] = metrics["slam_online_rmse_m"] / metrics["isam2_rmse_m"]
+    metrics |= left_out.summary(errors_m)
     metrics["slam_vs_smoother"] = metrics["slam_rmse_m"] / metrics["smoother_rmse_m"]
     metrics |= _means(recoveries)
     metrics["recovery_worst_s"] = max(row["recovery_worst_s"] for row in recoveries)

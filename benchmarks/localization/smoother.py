@@ -1,8 +1,11 @@
-"""The peer of mapping: a batch smoother of gtsam's, which gets the whole log at once."""
+"""The peers of mapping, gtsam's: a batch smoother, which gets the whole log at once, and iSAM2,
+which estimates each pose when it is there.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -30,6 +33,26 @@ def smooth(moments: Sequence[Moment]) -> Floats:
     return problem.solve()
 
 
+def smooth_online(moments: Sequence[Moment]) -> Floats:
+    """Return (n, 3) poses, each as iSAM2 (Kaess et al. 2012) has it at its own moment; the start is
+    at 0.
+
+    On the same factors as `smooth`. Raises UsageError if gtsam is not installed.
+    """
+    gtsam = optional.gtsam()
+    isam = gtsam.ISAM2(gtsam.ISAM2Params())
+    problem = Problem()
+    poses = []
+
+    for moment in moments:
+        problem.add(moment)
+        isam.update(*problem.take_new())
+        pose = isam.calculateEstimatePose2(problem.last)
+        problem.believe(pose)
+        poses.append((pose.x(), pose.y(), pose.theta()))
+    return np.array(poses)
+
+
 class Problem:
     """A factor graph of the poses at the moments and of the landmarks seen.
 
@@ -41,6 +64,7 @@ class Problem:
         self._gtsam = optional.gtsam()
         self._graph = self._gtsam.NonlinearFactorGraph()
         self._start = self._gtsam.Values()
+        self._known: set[int] = set()
         self._count = 0
         self._pose = self._gtsam.Pose2(0.0, 0.0, 0.0)
 
@@ -78,9 +102,26 @@ class Problem:
             seen = self._gtsam.BearingRangeFactor2D(here, landmark, bearing, range_m, robust)
             self._graph.add(seen)
 
-            if not self._start.exists(landmark):
+            if landmark not in self._known:
+                self._known.add(landmark)
                 direction = np.array([np.cos(percept.bearing_rad), np.sin(percept.bearing_rad)])
                 self._start.insert(landmark, self._pose.transformFrom(range_m * direction))
+
+    @property
+    def last(self) -> int:
+        """Return the key of the newest pose."""
+        return self._key(self._count)
+
+    def believe(self, pose: Any) -> None:
+        """Let the next pose begin from that one."""
+        self._pose = pose
+
+    def take_new(self) -> tuple[Any, Any]:
+        """Return the factors and first values since the last call, and forget them."""
+        new = self._graph, self._start
+        self._graph = self._gtsam.NonlinearFactorGraph()
+        self._start = self._gtsam.Values()
+        return new
 
     def solve(self) -> Floats:
         """Solve for the (n, 3) poses, without the start."""

@@ -8,9 +8,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from benchmarks.localization import left_out, particle_filter
 from benchmarks.localization.drives import follow
 from benchmarks.localization.loop import LOCALIZATION, LocalizationLoop
-from benchmarks.localization.senses import moments
+from benchmarks.localization.senses import label_of, moments
 from benchmarks.optional import trajectory_error_m
 from cogmap.data.mrclam import Robot
 from cogmap.errors import CogmapError
@@ -200,3 +201,29 @@ def test_the_wheels_delay_is_found_by_how_landmarks_turn() -> None:
         delay.observe(np.array([[now_s, 6, 3.0, -turned]]), np.sin)
 
     assert delay.lag_s == pytest.approx(late_s, abs=0.026)
+
+
+def test_the_particle_filter_localizes_the_robot_on_a_known_map(robot: Robot) -> None:
+    log = list(moments(robot))
+    surveyed = {label_of(subject): where for subject, where in LANDMARKS.items()}
+    path = particle_filter.localize(log, surveyed, START, (2.0, 1.0), 0)
+    again = particle_filter.localize(log, surveyed, START, (2.0, 1.0), 0)
+
+    stamps_s = np.array([moment.stamp_s for moment in log])
+    assert _rms(_error_m(path, _truth(robot, stamps_s))) < 0.25
+    assert (path == again).all()
+
+
+def test_a_robot_that_is_left_out_has_the_constants_that_the_others_choose() -> None:
+    by_robot_m = np.array([[0.1, 0.5], [0.3, 0.2], [0.3, 0.2]])
+
+    # The first robot's others err least with the second, the others' with the first.
+    assert left_out.left_out_error_m(by_robot_m) == pytest.approx((0.5 + 0.3 + 0.3) / 3)
+
+
+def test_constants_are_halved_and_doubled_one_at_a_time() -> None:
+    found = dict(left_out.candidates())
+
+    assert found["ours"] == {}
+    assert found["range_gain_sd_doubled"] == {"range_gain_sd": pytest.approx(0.06)}
+    assert len(found) == 1 + 2 * len(left_out.CONSTANTS)
