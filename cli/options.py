@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from cogmap.services.codelets.rules import PRESETS
+
 
 class FiniteRange(click.FloatRange):
     """A range of finite numbers: click's own takes nan, and inf where an end is open."""
@@ -23,6 +25,13 @@ class FiniteRange(click.FloatRange):
 DASHBOARD_PORT = 8470
 """Where a dashboard serves, if that is free."""
 
+rules_option = click.option(
+    "--rules",
+    type=click.Choice([*PRESETS]),
+    help="The rules by which the agent localizes, closes loops, corrects its map and plans: paper "
+    "has those of Madl et al. (2016) as printed, cogmap ours. Without it the settings decide, "
+    "cogmap's by default.",
+)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 wait_option = click.option(
     "--wait",

@@ -97,21 +97,22 @@ def city_maps(
     have the measured errors of perception.
     """
     out = results.folder_for(NAME, common.out)
+    rules = results.show_rules(common)
     with bar("choosing buildings"):
         places = _places(osm, all_in, maps, common.seed)
     chosen = Noise(speed=noise[0], turn=noise[1], drift_rad_per_sqrt_m=noise[2])
 
     if fit:
         with bar("fitting the noise") as progress:
-            budget = Budget(traversals, common.seed, common.processes, progress)
+            budget = Budget(traversals, common.seed, common.processes, progress, common.rules)
             chosen = fitted(places, budget)
 
     with bar("traversals") as progress:
-        budget = Budget(traversals, common.seed, common.processes, progress)
+        budget = Budget(traversals, common.seed, common.processes, progress, common.rules)
         found = measure(places, chosen, budget)
 
-    metrics = map_metrics(found, chosen)
-    first = jobs(places, chosen, 1, common.seed)[0]
+    metrics = map_metrics(found, chosen) | rules
+    first = jobs(places, chosen, 1, common.seed, common.rules)[0]
     if common.cameras:
         with bar("with cameras") as progress:
             metrics |= camera_metrics(by_cameras(first, progress), found[0].learned[0])

@@ -58,24 +58,26 @@ def cue_integration(common: Common, trials: int, distance_noise: float, fit: boo
     beside ours are those of a simulation, not of people.
     """
     folder = results.folder_for(NAME, common.out)
+    rules = results.show_rules(common)
     noise = Noise(FITTED.speed, FITTED.turn, distance_noise)
 
     if fit:
         with bar("fitting the noise") as progress:
-            budget = Budget(FIT_TRIALS, common.seed, common.processes, progress)
+            budget = Budget(FIT_TRIALS, common.seed, common.processes, progress, common.rules)
             noise = fitted(distance_noise, budget)
 
     with bar("trials") as progress:
-        found = measure(noise, Budget(trials, common.seed, common.processes, progress))
+        budget = Budget(trials, common.seed, common.processes, progress, common.rules)
+        found = measure(noise, budget)
 
-    metrics = found.metrics()
+    metrics: dict[str, float | str] = {**found.metrics(), **rules}
     if common.cameras:
         with bar("trials with cameras") as progress:
-            metrics |= camera_level.metrics(noise, common.seed, progress)
+            metrics |= camera_level.metrics(noise, common.seed, progress, common.rules)
 
     differing = None
     if common.live:
-        differing = _differing(Trial(Condition.CONFLICT, 0, noise, common.seed))
+        differing = _differing(Trial(Condition.CONFLICT, 0, noise, common.seed, common.rules))
         metrics[live.SAME] = float(not differing)
 
     results.show(NAME, metrics)
@@ -99,7 +101,7 @@ def _differing(trial: Trial) -> list[str]:
     def is_done() -> bool:
         return outside.transcript.has_as_many_as(inside.transcript)
 
-    live.run(agent.SECTIONS, instances, outside.bodies(), is_done)
+    live.run(agent.sections(trial.rules), instances, outside.bodies(), is_done)
     differing = outside.transcript.differs_from(inside.transcript)
 
     if outside.room.response != response:

@@ -28,22 +28,24 @@ Examples:
 def loop_closing(common: Common) -> None:
     """Make figure 6: a path around some blocks, before and after reverse replay closes its loop.
 
-    The agent drives twice: positions are corrected, by the paper's rule, or headings too. Percepts
+    The agent drives twice: positions are corrected, by reverse replay (eq. 9 as it is printed with
+    --rules paper), or headings too. Percepts
     are not rendered: they have the measured errors of perception. --cameras drives once more with
     rendered images. Takes one or two minutes.
     """
     folder = results.folder_for(NAME, common.out)
+    rules = results.show_rules(common)
     loops = _drive(common)
-    metrics: dict[str, Any] = loop_metrics(loops) | rule_metrics(common.seed)
+    metrics: dict[str, Any] = loop_metrics(loops) | rule_metrics(common.seed) | rules
 
     if common.cameras:
         with bar("driving with cameras") as progress:
-            seen = loop_metrics(drive_by_cameras(common.seed, progress))
+            seen = loop_metrics(drive_by_cameras(common.seed, progress, common.rules))
         metrics |= {f"cameras_{key}": value for key, value in seen.items()}
 
     differing = None
     if common.live:
-        differing = live.differing(sections(common.seed, "heading"), MODULES)
+        differing = live.differing(sections(common.seed, "heading", common.rules), MODULES)
         metrics[live.SAME] = float(not differing)
 
     results.show(NAME, metrics)
@@ -56,7 +58,7 @@ def loop_closing(common: Common) -> None:
 
 def _drive(common: Common) -> dict[str, Loop]:
     with bar("driving round the blocks") as progress:
-        work = partial(drive, common.seed)
+        work = partial(drive, common.seed, rules=common.rules)
         loops = parallel_map(work, METHODS, common.processes, progress)
 
     return dict(zip(METHODS, loops, strict=True))

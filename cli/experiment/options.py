@@ -11,14 +11,18 @@ from typing import Any
 
 import click
 
+from cogmap.cli.options import rules_option
 from cogmap.errors import UsageError
+from cogmap.services.codelets.rules import OURS
 
 Command = Callable[..., None]
 
 
 @dataclass(frozen=True)
 class Common:
-    """What the user chose of the options that every experiment has."""
+    """What the user chose of the options that every experiment has. `rules` is a preset of the
+    agent's.
+    """
 
     cameras: bool
     live: bool
@@ -26,6 +30,7 @@ class Common:
     processes: int
     out: Path | None
     json_path: Path | None
+    rules: str
 
 
 def _writable(context: click.Context, parameter: click.Parameter, path: Path | None) -> Path | None:
@@ -37,6 +42,7 @@ def _writable(context: click.Context, parameter: click.Parameter, path: Path | N
 
 
 _SENSING_OPTIONS = (
+    rules_option,
     click.option(
         "--cameras",
         is_flag=True,
@@ -84,7 +90,7 @@ def common_options(command: Command) -> Command:
 
 
 def common_options_without_sensing(command: Command) -> Command:
-    """Give `command` the shared options but --cameras and --live, as nothing is sensed."""
+    """Give `command` the shared options but --rules, --cameras and --live, as no agent senses."""
     return _with(command, _OPTIONS)
 
 
@@ -98,9 +104,11 @@ def _with(command: Command, options: Sequence[Callable[[Command], Command]]) -> 
         json_path: Path | None,
         cameras: bool = False,
         live: bool = False,
+        rules: str | None = None,
         **own: Any,
     ) -> None:
-        command(Common(cameras, live, seed, processes, out, json_path), **own)
+        common = Common(cameras, live, seed, processes, out, json_path, rules or OURS)
+        command(common, **own)
 
     decorated: Command = with_common
     for option in reversed(options):

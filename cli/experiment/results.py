@@ -18,6 +18,7 @@ from rich.table import Table
 from cogmap.cli.experiment.options import Common
 from cogmap.cli.plots.palette import PAPER
 from cogmap.errors import UsageError
+from cogmap.services.codelets.rules import PRESETS, described, metrics_of
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,6 +51,13 @@ def _remove_empty(folders: Iterable[Path]) -> None:
     with suppress(OSError):  # one is not empty, and stays
         for folder in folders:
             folder.rmdir()
+
+
+def show_rules(common: Common) -> dict[str, str]:
+    """Print the agent's rules in a line, and return them as metrics."""
+    rules = PRESETS[common.rules]
+    click.echo(described(rules))
+    return metrics_of(rules)
 
 
 def command_line() -> str:

@@ -160,7 +160,7 @@ class RunMetrics(RecordedMetrics, kw_only=True):
 
     `ended_by` is how it ended in two words, `reason` in a sentence. `wall_s` is how long the
     command took and `start_s` when, after it began, each milestone was reached. `restarts` and
-    `killed` name processes.
+    `killed` name processes. `rules_*` are the settings of `--rules`, as they were in effect.
     """
 
     ended_by: str
@@ -170,6 +170,10 @@ class RunMetrics(RecordedMetrics, kw_only=True):
     start_s: dict[str, float]
     restarts: dict[str, int]
     killed: list[str]
+    rules_localization: str = ""
+    rules_closes_by: str = ""
+    rules_correct: str = ""
+    rules_planning: str = ""
 
 
 def objects(graph: Graph) -> list[Object]:

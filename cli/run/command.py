@@ -10,7 +10,7 @@ import click
 
 from cogmap.cli.launch.command_line import ONE_THREAD
 from cogmap.cli.launch.forking.client import fork_server
-from cogmap.cli.options import FiniteRange
+from cogmap.cli.options import FiniteRange, rules_option
 from cogmap.cli.run.options import (
     LAP_LIMIT_S,
     codelets_option,
@@ -37,6 +37,7 @@ from cogmap.runtime.program import (
     tied_option,
 )
 from cogmap.services import registry
+from cogmap.services.codelets.rules import settings_of
 
 
 @click.command(epilog=formats_of_recordings())
@@ -90,6 +91,7 @@ from cogmap.services import registry
 @connect_option
 @agent_option
 @config_option
+@rules_option
 @set_option
 def run(
     seed: int | None,
@@ -116,6 +118,7 @@ def run(
     connect: str,
     agent: str,
     config_path: Path | None,
+    rules: str | None,
     settings: tuple[str, ...],
 ) -> None:
     """Drive the robot through a simulated town: to goals, by routes that it plans, or exploring.
@@ -153,9 +156,10 @@ def run(
             dashboard=dashboard or opens_dashboard,
             opens_dashboard=opens_dashboard,
         )
+        of_rules = [] if rules is None else settings_of(rules)
         start = Start(
             choices=choices,
-            given=config.load(config_path, settings),
+            given=config.load(config_path, [*of_rules, *settings]),
             endpoint=router or connect,
             agent=agent,
             out=out,

@@ -26,6 +26,7 @@ from cogmap.errors import StorageError
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
 from cogmap.services import registry
+from cogmap.services.codelets.rules import described, rules_of
 from cogmap.services.sim.layout.towns import LOOP, called
 
 
@@ -113,6 +114,7 @@ def _introduce(screen: Display, drive: Drive) -> None:
     sim = drive.sections["sim"]
     town = called(sim["town"], sim["seed"])
     screen.show(f"{drive.choices.recording or town}, files in {drive.folder}")
+    screen.show(described(rules_of(drive.sections)))
 
     if drive.goals:
         order = "in order" if drive.sections["workspace"]["in_order"] else "in an order of its own"

@@ -28,6 +28,7 @@ from cogmap.cli.launch.watchdog import MAX_SHARE_SLOWED, REMEDY
 from cogmap.cli.run.folder import SUMMARY_NAME
 from cogmap.recording.storage.format import LOG_NAME
 from cogmap.schemas.sensing import SpeedLimit
+from cogmap.services.codelets.rules import rules_of
 from cogmap.services.motor.config import Config as MotorConfig
 
 MAP_NAME = "map.png"
@@ -38,6 +39,7 @@ def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
     """Write the summary and the map of a drive that has ended so."""
     of_drive = drive_metrics(watch.tally, watch.gaps(), watch.rejected())
     log = Recording.read(drive.folder / LOG_NAME) if drive.choices.record else None
+    rules = rules_of(drive.sections)
     metrics = RunMetrics(
         **msgspec.structs.asdict(of_drive),
         completed=ending.outcome in {Outcome.ROUTE_COMPLETE, Outcome.RECORDING_OVER},
@@ -52,6 +54,10 @@ def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
         restarts=dict(drive.supervisor.restarts),
         killed=drive.supervisor.killed,
         log=log,
+        rules_localization=rules["localization"],
+        rules_closes_by=rules["closes_by"],
+        rules_correct=rules["correct"],
+        rules_planning=rules["planning"],
     )
     indented = msgspec.json.format(msgspec.json.encode(metrics))
     (drive.folder / SUMMARY_NAME).write_bytes(indented + b"\n")

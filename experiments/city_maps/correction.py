@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cogmap.runtime.config import Sections
+from cogmap.services.codelets.rules import OURS, positions_rule, with_rules
 
 # No loop is closed; positions only, as in the paper; headings too.
 METHODS = ("none", "positions", "heading")
@@ -11,8 +12,10 @@ PLACE_SD_M = 2.5
 PLACE_SD_RAD = 0.05
 
 
-def settings(method: str, step_m: float) -> Sections:
-    """Return the keys of the codelets for one of METHODS; views are `step_m` apart."""
+def settings(method: str, step_m: float, rules: str = OURS) -> Sections:
+    """Return the keys of the codelets for one of METHODS, by a preset of rules; views are `step_m`
+    apart.
+    """
     # The measured length of a step varies: with half of it, each view has its place on the path.
     codelets: dict[str, float | str] = {
         "path_spacing_m": step_m / 2,
@@ -26,6 +29,6 @@ def settings(method: str, step_m: float) -> Sections:
     if method == "none":
         codelets["revisit_s"] = NEVER_S
     else:
-        codelets["correct"] = method
+        codelets["correct"] = positions_rule(rules) if method == "positions" else method
 
-    return {"codelets": codelets}
+    return with_rules({"codelets": codelets}, rules)

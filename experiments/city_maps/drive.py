@@ -16,6 +16,7 @@ from cogmap.experiments.city_maps.observer import Observer, Traversal
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
 from cogmap.services import registry
+from cogmap.services.codelets.rules import OURS
 from cogmap.services.sim.odometry import Noise
 
 COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
@@ -39,9 +40,11 @@ class Tour:
     seed: int
 
 
-def sections(environment: Environment, tour: Tour, noise: Noise, method: str) -> Sections:
+def sections(
+    environment: Environment, tour: Tour, noise: Noise, method: str, rules: str = OURS
+) -> Sections:
     """Return the configuration of every module for one traversal, as for `cogmap run --config`."""
-    correction = settings(method, SPEED_M_S / FRAME_HZ)
+    correction = settings(method, SPEED_M_S / FRAME_HZ, rules)
     line_m = environment.line(tour.start, tour.backward, LEAD_M, OVERRUN_M)
     landmarks = [
         {"name": name, "x_m": x_m, "y_m": y_m}
@@ -66,7 +69,7 @@ def sections(environment: Environment, tour: Tour, noise: Noise, method: str) ->
         "run": {"lockstep": True, "participants": dict.fromkeys(MODULES, 1)},
         "sim": sim,
         "workspace": workspace,
-        "codelets": correction["codelets"],
+        **correction,
     }
 
 

@@ -45,7 +45,7 @@ def fitted(environments: Sequence[Environment], budget: Budget) -> Noise:
         if max(noise.speed, noise.turn) > MAX_NOISE:
             return float("inf")
 
-        tried = jobs(environments, noise, traversals, seed)
+        tried = jobs(environments, noise, traversals, seed, budget.rules)
         errors_km2 = parallel_map(positions_error_km2, tried, budget.processes, budget.progress)
 
         mean_km2 = float(np.mean(errors_km2))

@@ -15,6 +15,7 @@ from cogmap.experiments.city_maps.observer import Traversal
 from cogmap.experiments.city_maps.streets import Points
 from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.config import Sections
+from cogmap.services.codelets.rules import OURS
 from cogmap.services.sim.odometry import Noise
 
 TRAVERSALS = 12
@@ -24,22 +25,26 @@ NOISE = Noise(speed=0.1, turn=0.1, drift_rad_per_sqrt_m=0.0)
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """One traversal of one environment."""
+    """One traversal of one environment, by a preset of rules."""
 
     environment: Environment
     number: int
     noise: Noise
     seed: int
+    rules: str = OURS
 
 
 @dataclass(frozen=True)
 class Budget:
-    """How often each environment is traversed, from which seed, on how many processes."""
+    """How often each environment is traversed, from which seed, on how many processes, and by which
+    preset of rules.
+    """
 
     traversals: int
     seed: int
     processes: int
     progress: Progress = lambda share: None
+    rules: str = OURS
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +87,7 @@ class CityMap:
 
 def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
     """Measure all environments: the same seed gives the same, whatever the number of processes."""
-    every = jobs(environments, noise, budget.traversals, budget.seed)
+    every = jobs(environments, noise, budget.traversals, budget.seed, budget.rules)
     learned = parallel_map(traversed, every, budget.processes, budget.progress)
     maps = []
 
@@ -96,7 +101,11 @@ def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -
 
 
 def jobs(
-    environments: Sequence[Environment], noise: Noise, traversals: int, seed: int
+    environments: Sequence[Environment],
+    noise: Noise,
+    traversals: int,
+    seed: int,
+    rules: str = OURS,
 ) -> list[Job]:
     """Return all traversals of each environment, one environment after the other."""
     found = []
@@ -104,7 +113,7 @@ def jobs(
     for place, environment in enumerate(environments):
         own_seed = seed * 1000 + place
         for number in range(traversals):
-            found.append(Job(environment, number, noise, own_seed))
+            found.append(Job(environment, number, noise, own_seed, rules))
 
     return found
 
@@ -140,7 +149,7 @@ def configurations(job: Job) -> dict[str, Sections]:
     found = {}
 
     for method in METHODS:
-        found[method] = sections(job.environment, tour, job.noise, method)
+        found[method] = sections(job.environment, tour, job.noise, method, job.rules)
 
     return found
 

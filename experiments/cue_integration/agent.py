@@ -7,10 +7,11 @@ from typing import Any
 from cogmap.runtime.module import Module
 from cogmap.schemas.graph import Decay, Snapshot
 from cogmap.services import registry
+from cogmap.services.codelets.rules import with_rules
 
 # Distances err anew with each look here, so each counts (eq. 1); the room is small, and so are its
 # places.
-SECTIONS: dict[str, dict[str, Any]] = {
+ROOM: dict[str, dict[str, Any]] = {
     "run": {"lockstep": True},
     "workspace": {"cell_m": 0.25},
     "codelets": {"landmarks": "points"},
@@ -19,13 +20,19 @@ WORKER = "codelets-1"
 CYCLES_A_TRIAL = 1000
 
 
-def modules(number: int) -> list[Module]:
-    """Build workspace and one worker for trial `number`.
+def sections(rules: str) -> dict[str, dict[str, Any]]:
+    """Return the configuration of the mind, by a preset of rules."""
+    return with_rules(ROOM, rules)
+
+
+def modules(number: int, rules: str) -> list[Module]:
+    """Build workspace and one worker for trial `number`, by a preset of rules.
 
     Codelets draw their samples by the number of the cycle. Each trial has cycles of its own, as if
     others had gone before: otherwise chance would be the same in all.
     """
-    workspace = registry.build("workspace", SECTIONS, "workspace")
+    configured = sections(rules)
+    workspace = registry.build("workspace", configured, "workspace")
     if number and workspace.restore is not None:
         workspace.restore(
             [
@@ -39,4 +46,4 @@ def modules(number: int) -> list[Module]:
                 )
             ]
         )
-    return [workspace, registry.build("codelets", SECTIONS, WORKER)]
+    return [workspace, registry.build("codelets", configured, WORKER)]

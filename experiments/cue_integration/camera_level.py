@@ -25,6 +25,7 @@ from cogmap.robot import calibration
 from cogmap.schemas import sensing
 from cogmap.schemas.sensing import Odometry, Percept, Percepts, View
 from cogmap.services import registry
+from cogmap.services.codelets.rules import OURS
 from cogmap.services.sim.layout import roadside
 from cogmap.services.sim.rendering.camera import StereoCamera
 from cogmap.services.sim.trajectory import Trajectory
@@ -113,14 +114,14 @@ class PicturedRoom(Room):
         return world, StereoCamera(world, calibration())
 
 
-def metrics(noise: Noise, seed: int, progress: Progress) -> dict[str, float]:
+def metrics(noise: Noise, seed: int, progress: Progress, rules: str = OURS) -> dict[str, float]:
     """Return the error of the response in one trial of each condition with cameras, and in the same
     with percepts that are not drawn.
     """
     found: dict[str, float] = {}
 
     for done, condition in enumerate(Condition, start=1):
-        trial = Trial(condition, 0, noise, seed)
+        trial = Trial(condition, 0, noise, seed, rules)
         name = condition.value
         session = Session(trial, PicturedRoom)
         try:

@@ -19,6 +19,7 @@ from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
+from cogmap.services.codelets.rules import OURS
 
 # What `fitted` returns with the seed and budget that the command has by default, rounded.
 FITTED = Noise(speed=0.3, turn=0.173)
@@ -54,7 +55,7 @@ class Session:
 
     def run(self) -> Response:
         """Run it on the in-memory bus. Raises CogmapError if no response comes."""
-        mind = agent.modules(self.trial.number)
+        mind = agent.modules(self.trial.number, self.trial.rules)
         runner = InProcessRunner([*mind, *self.bodies()])
         runner.run()
         runner.close()
@@ -160,14 +161,15 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Budget:
-    """How many trials of each condition, with what seed, on how many processes, and where the
-    progress is reported.
+    """How many trials of each condition, with what seed, on how many processes, where the progress
+    is reported, and by which preset of rules.
     """
 
     trials: int
     seed: int
     processes: int
     progress: Progress = lambda share: None
+    rules: str = OURS
 
 
 def measure(
@@ -177,7 +179,7 @@ def measure(
     jobs = []
     for condition in conditions:
         for number in range(budget.trials):
-            trial = Trial(condition, number, noise, budget.seed)
+            trial = Trial(condition, number, noise, budget.seed, budget.rules)
             jobs.append(trial)
 
     responses = parallel_map(respond, jobs, budget.processes, budget.progress)

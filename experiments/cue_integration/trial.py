@@ -9,6 +9,7 @@ import msgspec
 import numpy as np
 
 from cogmap.experiments.cue_integration.geometry import CONFLICT_RAD, POSTS, ROUTES, Point, turned
+from cogmap.services.codelets.rules import OURS
 
 
 class Condition(enum.Enum):
@@ -34,12 +35,13 @@ class Noise(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True)
 class Trial:
-    """One trial of one condition. The same numbers give the same bytes."""
+    """One trial of one condition, by a preset of rules. The same numbers give the same bytes."""
 
     condition: Condition
     number: int
     noise: Noise
     seed: int
+    rules: str = OURS
 
     @property
     def route(self) -> tuple[int, int, int]:

@@ -15,6 +15,7 @@ from cogmap.parallel import Progress
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
 from cogmap.services import registry
+from cogmap.services.codelets.rules import OURS, positions_rule, with_rules
 from cogmap.services.sim.config import ODOMETRY_HZ
 from cogmap.services.sim.odometry import Noise
 
@@ -65,9 +66,9 @@ def trajectory() -> dict[str, Any]:
     return {"line_m": line_m, "landmarks": landmarks, "speed_m_s": SPEED_M_S}
 
 
-def sections(seed: int, method: str) -> Sections:
-    """Return the configuration of every module, as for `cogmap run --config`, for one of
-    METHODS.
+def sections(seed: int, method: str, rules: str = OURS) -> Sections:
+    """Return the configuration of every module, as for `cogmap run --config`, for one of METHODS,
+    by a preset of rules.
     """
     step_m = SPEED_M_S / FRAME_HZ
     sim = {
@@ -80,31 +81,32 @@ def sections(seed: int, method: str) -> Sections:
     workspace = {"cell_m": CELL_M, "base_level_decay": 0.0}
 
     codelets = {
-        "correct": method,
+        "correct": positions_rule(rules) if method == "positions" else method,
         "path_spacing_m": step_m,
         "path_variance_per_m": NOISE.speed**2 * step_m,
         "heading_variance_per_m": NOISE.drift_rad_per_sqrt_m**2,
         "heading_variance_per_rad": NOISE.turn**2 * CORNER_RAD,
     }
 
-    return {
+    configured: Sections = {
         "run": {"lockstep": True, "participants": dict.fromkeys(MODULES, 1)},
         "sim": sim,
         "workspace": workspace,
         "codelets": codelets,
     }
+    return with_rules(configured, rules)
 
 
-def drive(seed: int, method: str) -> Loop:
+def drive(seed: int, method: str, rules: str = OURS) -> Loop:
     """Drive the loop once. Raises CogmapError if no loop is closed, or a message is refused."""
-    configured = sections(seed, method)
+    configured = sections(seed, method, rules)
     modules = [registry.build(name, configured) for name in MODULES]
     return driven(configured, modules)
 
 
-def drive_by_cameras(seed: int, progress: Progress) -> dict[str, Loop]:
+def drive_by_cameras(seed: int, progress: Progress, rules: str = OURS) -> dict[str, Loop]:
     """Drive as `drive` does, by each of METHODS, with buildings that are drawn and recognised."""
-    configured = {method: sections(seed, method) for method in METHODS}
+    configured = {method: sections(seed, method, rules) for method in METHODS}
     return rendered.by_cameras(configured, COGNITION, driven, progress)
 
 

@@ -24,6 +24,16 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     drives.
     """
 
+    localization: Annotated[
+        Literal["paper", "cogmap"],
+        Meta(
+            description="How samples follow self-motion and views. paper: they start again from "
+            "their mean at each step (table 1), and are kept by the product of the likelihoods of "
+            "all views (eq. 1-3), as each landmark's are by its own view (eq. 4); if none is kept, "
+            "those before the view stay. cogmap: they continue from themselves, in stages, a view "
+            "counts by what is new in it, and a lost agent is found again."
+        ),
+    ] = "cogmap"
     samples: Annotated[
         int,
         Meta(description="Monte-Carlo samples of the agent's pose.", ge=10, le=100_000),
@@ -96,11 +106,21 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Positive,
         Meta(description="Least variance of path integration's heading, rad^2 per rad turned."),
     ] = 1e-6
-    correct: Annotated[
-        Literal["positions", "heading"],
+    closes_by: Annotated[
+        Literal["sighting", "agreement"],
         Meta(
-            description="What map correction corrects: positions alone, by reverse replay (eq. "
-            "9), or headings too, by nonlinear least squares."
+            description="What closes a loop. sighting: one landmark seen again after `revisit_s`, "
+            "at once, and no recognised place (paper 5.6). agreement: several views, of landmarks "
+            "or places, that are consistent with one another."
+        ),
+    ] = "agreement"
+    correct: Annotated[
+        Literal["eq9", "positions", "heading"],
+        Meta(
+            description="How map correction closes loops. eq9: positions alone, by eq. 9 as it is "
+            "printed, from the path believed; objects shift with the nearest place of the path. "
+            "positions: positions alone, by reverse replay to the least of eq. 7. heading: "
+            "headings too, by nonlinear least squares."
         ),
     ] = "heading"
     anchor: Annotated[

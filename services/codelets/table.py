@@ -29,7 +29,7 @@ class Row(NamedTuple):
 
 
 ROWS = (
-    Row("correction.apply_correction"),
+    Row("correction.apply_correction", "config"),
     Row("correction.join_map"),
     Row("correction.sparse_path", "config"),
     Row("localization.localization", "config"),

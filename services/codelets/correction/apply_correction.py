@@ -15,7 +15,7 @@ from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import mean_pose, move_with, wrap_angle
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
-from cogmap.runtime.codelet import Answer, Codelet, CycleContext, NoSettings
+from cogmap.runtime.codelet import Answer, Codelet, CycleContext
 from cogmap.schemas.array import Matrix
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.graph import DropNode, Link, Operation, Phase
@@ -35,6 +35,7 @@ from cogmap.schemas.nodes import (
     nearest_place,
     object_id,
 )
+from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.correction.place_columns import MOVED_COLUMNS, move_places
 from cogmap.services.codelets.localization.sampling import generator
 from cogmap.services.codelets.mapping.observations import Sightings
@@ -48,14 +49,14 @@ OLD_POSITION = slice(CorrectionColumn.OLD_X_M, CorrectionColumn.OLD_Y_M + 1)
 BESIDE_M = 10.0
 
 
-def due(context: CycleContext, graph: Graph, config: NoSettings) -> list[Task]:
+def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """Return one task if a correction waits to be applied."""
     if CORRECTION_ID not in graph.nodes:
         return []
     return [context.task(CODELET.name, about=[CORRECTION_ID])]
 
 
-def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
+def run(task: Task, graph: Graph, config: Config) -> Answer:
     """Move everything on the map as the correction states, and forget the correction."""
     correction = graph.get(Correction, CORRECTION_ID)
     if correction is None:
@@ -68,11 +69,14 @@ def run(task: Task, graph: Graph, config: NoSettings) -> Answer:
     has_begun = len(path) > 0 and path[0, STAMP] == rows[0, STAMP]
     if has_begun and not np.array_equal(path[0, POSE], rows[0, OLD]):
         return Answer([DropNode(id=CORRECTION_ID)])
-    return Answer([DropNode(id=CORRECTION_ID), *moved(graph, rows)])
+    by_nearest = config.correct == "eq9"
+    return Answer([DropNode(id=CORRECTION_ID), *moved(graph, rows, by_nearest=by_nearest)])
 
 
-def moved(graph: Graph, rows: Floats) -> list[Operation]:
-    """Move everything on the root map as (n, 7) rows of a correction state."""
+def moved(graph: Graph, rows: Floats, *, by_nearest: bool = False) -> list[Operation]:
+    """Move everything on the root map as (n, 7) rows of a correction state: objects, as they were
+    observed, or each `by_nearest` place of the path (paper §5.6).
+    """
     # Each place of the path moves with the first row that is not before it.
     path = rows_of(graph.of_kind(PathSegment))
     following = np.searchsorted(rows[:, STAMP], path[:, STAMP]).clip(0, len(rows) - 1)
@@ -100,7 +104,7 @@ def moved(graph: Graph, rows: Floats) -> list[Operation]:
         )
         operations += [moved_agent, _place_link(moved_agent, graph)]
 
-    operations += _move_objects(graph, rows, path)
+    operations += _shift_objects(graph, rows) if by_nearest else _move_objects(graph, rows, path)
     operations += _move_maps(graph, rows)
     operations += move_places(graph, rows[:, OLD], rows[:, NEW])
     return operations
@@ -113,6 +117,8 @@ CODELET = Codelet(
     run=run,
     reads=frozenset({Correction, PathSegment, Observations, Self, Object, Map, *MOVED_COLUMNS}),
     writes=frozenset({Correction, PathSegment, Self, Object, Map, LinkKind.AT, *MOVED_COLUMNS}),
+    config=Config,
+    section=SECTION,
 )
 
 
@@ -152,14 +158,41 @@ def _move_objects(graph: Graph, rows: Floats, path: Floats) -> list[Operation]:
             row = _row_of(node, mean_m, rows)
             moved_m = move_with(positions_m, row[:, OLD], row[:, NEW])
 
-        if not np.array_equal(moved_m, positions_m):
-            after_m = moved_m.mean(axis=0)
-            x_m, y_m = after_m.tolist()
-            samples = None if node.offsets_m is None else Matrix.of(moved_m - after_m, "<f2")
-            after = msgspec.structs.replace(node, x_m=x_m, y_m=y_m, offsets_m=samples)
-            operations += [after, _place_link(after, graph)]
+        operations += _placed(node, positions_m, moved_m, graph)
 
     return operations
+
+
+def _shift_objects(graph: Graph, rows: Floats) -> list[Operation]:
+    """Move the objects, except those that were surveyed, each with the place of the path that is
+    nearest to it, however it was observed.
+    """
+    operations: list[Operation] = []
+    for node in graph.of_kind(Object):
+        if node.surveyed:
+            continue
+
+        positions_m = node.positions_m()
+        away_m = np.hypot(*(rows[:, OLD_POSITION] - positions_m.mean(axis=0)).T)
+        row = rows[[away_m.argmin()]]
+        moved_m = move_with(positions_m, row[:, OLD], row[:, NEW])
+        operations += _placed(node, positions_m, moved_m, graph)
+
+    return operations
+
+
+def _placed(node: Object, before_m: Floats, after_m: Floats, graph: Graph) -> list[Operation]:
+    """Place an object at (n, 2) samples `after_m` and link it to its place, if they are not as
+    `before_m`.
+    """
+    if np.array_equal(after_m, before_m):
+        return []
+
+    mean_m = after_m.mean(axis=0)
+    x_m, y_m = mean_m.tolist()
+    samples = None if node.offsets_m is None else Matrix.of(after_m - mean_m, "<f2")
+    after = msgspec.structs.replace(node, x_m=x_m, y_m=y_m, offsets_m=samples)
+    return [after, _place_link(after, graph)]
 
 
 def _heard(graph: Graph, path: Floats) -> dict[str, Floats]:

@@ -16,7 +16,12 @@ from scipy.special import chdtri
 from cogmap.estimation.alignment import motion_onto
 from cogmap.estimation.gnc import inliers
 from cogmap.estimation.least_squares import optimize
-from cogmap.estimation.pairwise_consistency import MAX_VIEW_SD_M, MIN_AGREEING, consistent
+from cogmap.estimation.pairwise_consistency import (
+    MAX_VIEW_SD_M,
+    MIN_AGREEING,
+    Views,
+    consistent,
+)
 from cogmap.estimation.pose_graph import (
     NO_CONSTRAINTS,
     Constraints,
@@ -25,10 +30,13 @@ from cogmap.estimation.pose_graph import (
     matvec,
     residuals,
 )
+from cogmap.estimation.printed_rule import Loops
+from cogmap.estimation.printed_rule import close_loops as close_loops_as_printed
 from cogmap.estimation.reverse_replay import close_loops, with_positions_only
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import (
     cumulative,
+    rotate,
     rotation_matrices,
     transform_from,
     wrap_angle,
@@ -76,12 +84,17 @@ UNEXPLAINED_SHARE = 0.1
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """Return one task if closures of the present pass were not judged yet, and enough of it are
     there to agree; unless some were judged just now, a correction waits to be applied, or the path,
-    part of which is sparse, explains them.
+    part of which is sparse, explains them. If one sighting closes a loop, there is one at once.
     """
     if CORRECTION_ID in graph.nodes:
         return []
 
     closures = list(graph.of_kind(LoopClosure))
+    unjudged = [closure for closure in closures if closure.accepted is None]
+    is_sighted = any(not closure.range_alone for closure in unjudged)
+    if config.closes_by == "sighting" and is_sighted:
+        return [context.task(CODELET.name, about=[closure.id for closure in unjudged])]
+
     since_ns = context.stamp_ns - config.revisit_s * 1e9
     late = [closure for closure in closures if closure.to_ns > since_ns]
     fresh = [closure for closure in late if closure.accepted is None]
@@ -138,7 +151,10 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     observed = Sightings.of(graph.of_kind(Observations), rows[:, STAMP])
     seen = observed.of_known_extent(sized)
     heard = Ranges.of(graph.of_kind(Observations), rows[:, STAMP])
-    poses, replays = corrected(judgement.path, seen, heard, config)
+    if config.correct == "eq9":
+        poses, replays = shifted(rows, judgement, config)
+    else:
+        poses, replays = corrected(judgement.path, seen, heard, config)
     if config.anchor == "map":
         # Moved as one to where the path was believed to be as far as earlier corrections reach;
         # without any, to where it was corrected from.
@@ -195,25 +211,30 @@ def may_be_deferred(closures: list[LoopClosure], rows: Floats) -> bool:
     return unexplained < max(MIN_AGREEING, UNEXPLAINED_SHARE * len(closures))
 
 
-class _Judgement(NamedTuple):
+class Judgement(NamedTuple):
     """Which closures are consistent with one another (m,) and which are accepted (m,), and the path
-    with those.
+    with those, which are also given as views.
     """
 
     is_consistent: Booleans
     is_accepted: Booleans
     path: PoseGraph
+    accepted: Views
 
 
-def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config) -> _Judgement:
+def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config) -> Judgement:
     """Return which of the closures of a path are consistent, and of these accepted. Those by range
-    alone are always: the ranges are weighed one by one as the path is corrected.
+    alone are always: the ranges are weighed one by one as the path is corrected. All are if one
+    sighting closes a loop.
     """
     rows = rows_of(path)
     steps = steps_of(rows, config)
     is_view = np.array([not each.range_alone for each in closures])
     views = views_of([each for each in closures if not each.range_alone], rows)
-    is_consistent = consistent(views, steps, FALSE_CLOSURE)
+    believes_all = config.closes_by == "sighting"
+    is_consistent = np.ones(len(views.i), bool)
+    if not believes_all:
+        is_consistent = consistent(views, steps, FALSE_CLOSURE)
     is_consistent &= views.j - views.i >= MIN_ROWS
 
     # Closures of the sparse part of the path that were consistent stay so: those that they agreed
@@ -235,7 +256,9 @@ def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config)
     chosen = views.select(is_consistent)
     loops = constraints_of(chosen, start.poses)
     for _ in range(MAX_ROUNDS):
-        holds = inliers(start.with_closures(loops), FALSE_CLOSURE)
+        holds = np.ones(len(loops), bool)
+        if not believes_all:
+            holds = inliers(start.with_closures(loops), FALSE_CLOSURE)
         graph = start.with_closures(loops.select(holds))
         again = constraints_of(chosen, optimize(graph))
 
@@ -248,7 +271,7 @@ def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config)
     agrees[is_view] = is_consistent
     is_accepted = agrees.copy()
     is_accepted[is_view & agrees] = holds
-    return _Judgement(agrees, is_accepted, graph)
+    return Judgement(agrees, is_accepted, graph, chosen.select(holds))
 
 
 def _start(poses: Floats, steps: Constraints) -> Floats:
@@ -266,10 +289,25 @@ def _start(poses: Floats, steps: Constraints) -> Floats:
     return np.column_stack([poses[0, :2] + moved_m, wrap_angle(heading_rad)])
 
 
+def shifted(rows: Floats, judgement: Judgement, config: Config) -> tuple[Floats, int]:
+    """Close the accepted loops of the path `rows`, as it is believed, by eq. 9 as it is printed.
+    Return the (n, 3) poses, whose headings stay, and how often the path was replayed.
+    """
+    poses = rows[:, POSE]
+    views = judgement.accepted
+    there_m = rotate(views.there_m, poses[views.i, 2])
+    here_m = rotate(views.here_m, poses[views.j, 2])
+    loops = Loops(views.i, views.j, here_m - there_m, views.sd_m**2)
+
+    step_m2 = steps_of(rows, config).variance_m2
+    positions_m, replays = close_loops_as_printed(poses[:, :2], loops, step_m2)
+    return np.column_stack([positions_m, poses[:, 2]]), replays
+
+
 def corrected(
     graph: PoseGraph, seen: Sightings, heard: Ranges, config: Config
 ) -> tuple[Floats, int]:
-    """Close all loops, by the paper's rule or with the headings. Return the (n, 3) poses, and how
+    """Close all loops, by reverse replay or with the headings. Return the (n, 3) poses, and how
     often the whole path was replayed for that: reverse replays of eq. 9, or solutions with the
     headings.
 

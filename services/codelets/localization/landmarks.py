@@ -31,6 +31,7 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.localization import paper_rule
 from cogmap.services.codelets.localization.information import INDEPENDENT_RAD, new_view_share
 from cogmap.services.codelets.localization.measurement_model import (
     FARTHEST_M,
@@ -84,7 +85,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     A landmark that disagrees in MISSES views in a row, or in more than it ever agreed with, stands
     elsewhere: it starts anew from what is seen, once it is certain that the agent is not elsewhere.
     While the agent stands still and sees the same again, landmarks stay where they are; those that
-    were surveyed always do.
+    were surveyed always do. By the paper's own rule every view counts, and none starts anew.
     """
     agent = graph.agent
     if agent is None:
@@ -118,6 +119,9 @@ def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config:
     """Keep the positions of a landmark that agree with the view of `task`, and count in how many
     views it agreed, or in how many in a row it did not.
     """
+    if config.localization == "paper" and not landmark.surveyed:
+        return _by_paper(landmark, percept, agent, task)
+
     is_same_view = is_seen_from_here(landmark, agent.stationary_since_ns)
     if landmark.surveyed or agent.misfits.is_lost or is_same_view:
         return landmark
@@ -154,6 +158,20 @@ def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config:
 
     anew = msgspec.structs.replace(landmark, sightings=1, misses=0, created_ns=task.stamp_ns)
     return with_positions(anew, first_positions(selves, percept, rng))
+
+
+def _by_paper(landmark: Object, percept: Percept, agent: Self, task: Task) -> Object:
+    """Keep the positions by eq. 4 as it is printed, seen from the mean of the self's samples, and
+    count in how many views there were any, or in how many in a row there were none.
+    """
+    pose = mean_pose(agent.samples.numpy())
+    rng = generator(f"{task.task_id}/{percept.label}")
+    kept_m, share = paper_rule.landmark(landmark.positions_m(), pose, percept, rng)
+    if not share:
+        return msgspec.structs.replace(landmark, misses=landmark.misses + 1)
+
+    fitting = msgspec.structs.replace(landmark, sightings=landmark.sightings + 1, misses=0)
+    return with_positions(fitting, kept_m)
 
 
 def is_well_placed(landmark: Object, percept: Percept) -> bool:

@@ -49,6 +49,9 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     long_ago_ns = context.stamp_ns - config.revisit_s * 1e9
     again = _seen_again(percepts.objects, graph, context.stamp_ns, config)
     matches = [match for match in percepts.matches if match.view_ns <= long_ago_ns]
+    if config.closes_by == "sighting":
+        # The paper's agent recognises landmarks alone.
+        matches = []
     if matches:
         newest = newest_closures(graph).get(PLACE_CUE)
         recently_ns = context.stamp_ns - config.closure_spacing_s * 1e9
@@ -126,7 +129,8 @@ def _seen_again(
     percepts: Iterable[Percept], graph: Graph, now_ns: int, config: Config
 ) -> list[Percept]:
     """Choose the percepts of landmarks that come again: last seen, or closing a loop, long ago; or
-    closing one on this pass, if the path has grown since.
+    closing one on this pass, if the path has grown since. A landmark whose sighting closes a loop
+    closes one on a pass.
     """
     known = [each for each in percepts if each.whole and object_id(each.label) in graph.nodes]
     if not known:
@@ -145,6 +149,8 @@ def _seen_again(
             heard_ns = NEVER_NS if landmark is None else landmark.created_ns
             since_ns = heard_ns if closure is None else closure.to_ns
             is_again = grows and NEVER_NS < since_ns <= long_ago_ns
+        elif config.closes_by == "sighting":
+            is_again = landmark is not None and 0 <= landmark.last_seen_ns <= long_ago_ns
         elif closure is not None and closure.to_ns > long_ago_ns:
             is_again = grows and closure.to_ns <= recently_ns
         else:
@@ -177,7 +183,8 @@ def _closure_by_landmark(
     rows = rows_of(nodes_of(graph, PathSegment, [segment_id(number) for number in numbers]))
     seen = Sightings.of(observations, rows[:, STAMP])
     known = np.flatnonzero(rows[seen.place, STAMP] <= before_ns * 1e-9 + 1e-6)
-    if len(known) < MIN_AGREEING:
+    enough = 1 if config.closes_by == "sighting" else MIN_AGREEING
+    if len(known) < enough:
         return None
 
     # Those up to then that most others agree with, from the nearest on: on one pass by, they lead
@@ -186,7 +193,7 @@ def _closure_by_landmark(
     offset_m = where_m[:, None] - where_m
     is_near = np.hypot(offset_m[..., 0], offset_m[..., 1]) <= SAME_M
     there = known[is_near[is_near.sum(axis=1).argmax()]]
-    if len(there) < MIN_AGREEING:
+    if len(there) < enough:
         return None
     there = there[np.argsort(np.hypot(*seen.where_m[there].T), kind="stable")]
 

@@ -102,6 +102,39 @@ class Field:
         route: Indices = np.column_stack([i, j]) + np.array(self.network.origin)
         return route
 
+    def ascend(self, start: Cell) -> Indices | None:
+        """Return the (n, 2) cells from `start` to a goal, each the linked neighbour with the
+        highest activation, the first of those alike (figure 5 A); None if none arrives at the
+        start.
+
+        `climb` goes to the neighbour that passed most activation on, which a dear link keeps from
+        being always the same.
+        """
+        if not self.arrives(start):
+            return None
+
+        i, j = self.network.index_of(start)
+        cells = [(i, j)]
+        while self.distance_m[i, j] > 0:
+            near = self._linked(i, j)
+            i, j = min(near, key=lambda cell: float(self.distance_m[cell]))
+            cells.append((i, j))
+        route: Indices = np.array(cells, np.int64) + np.array(self.network.origin)
+        return route
+
+    def _linked(self, i: int, j: int) -> list[Cell]:
+        """Return the indices of the neighbours that links lead to."""
+        width, height = self.network.shape
+        found = []
+        for weights, (di, dj) in zip(self.network.weights, LINK_OFFSETS.tolist(), strict=True):
+            if weights[i, j] > 0:
+                found.append((i + di, j + dj))
+            back_i, back_j = i - di, j - dj
+            is_inside = 0 <= back_i < width and 0 <= back_j < height
+            if is_inside and weights[back_i, back_j] > 0:
+                found.append((back_i, back_j))
+        return found
+
 
 def spread(
     network: PlaceNetwork, goals: Indices, links: Links | None = None, until: Cell | None = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 import msgspec
 from msgspec import Meta
@@ -15,6 +15,16 @@ SECTION = "planning"
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
     """How routes are planned, and where the agent explores."""
 
+    planning: Annotated[
+        Literal["gradient", "hierarchy"],
+        Meta(
+            description="How routes are found (paper 5.5). gradient: on the finest map that has "
+            "start and goal, from neighbour to neighbour up the activation that spreads from the "
+            "goal; of several goals always to the nearest (figure 5 A-C). hierarchy: on coarse "
+            "maps first, goals in an order that makes the tour short (figure 5 D), and lines "
+            "straightened."
+        ),
+    ] = "hierarchy"
     explore: Annotated[
         bool,
         Meta(description="Explore while there is no goal, or none with a route."),

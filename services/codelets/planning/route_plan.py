@@ -62,7 +62,12 @@ from cogmap.services.codelets.planning.targets import (
     pending_goals,
     target_of,
 )
-from cogmap.services.codelets.planning.tours import TourSettings, order_from, route_length
+from cogmap.services.codelets.planning.tours import (
+    TourSettings,
+    follow_activation,
+    order_from,
+    route_length,
+)
 
 START_M = 6.0
 """Within so far of the agent a route may begin: a place where it fits is near a street."""
@@ -95,7 +100,9 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         raise MessageError(f"task {task.task_id}: the graph has no self node")
 
     situation = Situation(task, graph, agent, config, graph.get(Plan, PLAN_ID))
-    within = corridor(graph, agent, goals_m(graph, agent), config)
+    within = None
+    if config.planning == "hierarchy":
+        within = corridor(graph, agent, goals_m(graph, agent), config)
     if within is not None:
         outcome = planned(situation, place_costs(graph, agent, config, within=within))
         if not outcome.plan.unreachable and not outcome.plan.doubtful:
@@ -173,6 +180,7 @@ def planned(situation: Situation, costs: PlaceCosts) -> Outcome:
         unreachable = {target.goal.id: PlanState.BLOCKED for target in targets}
         return outcome(state=PlanState.BLOCKED, unreachable=unreachable)
 
+    is_flat = config.planning == "gradient"
     # Activation spreads from each goal; those at which the agent is not activated have no route.
     found: list[Visit] = []
     unreachable = {}
@@ -183,7 +191,7 @@ def planned(situation: Situation, costs: PlaceCosts) -> Outcome:
             unreachable[target.goal.id] = target.state
             continue
         field = spread(network, np.array(target.cells), links, until)
-        route = field.climb(start)
+        route = field.ascend(start) if is_flat else field.climb(start)
         if route is None:
             unreachable[target.goal.id] = PlanState.NO_ROUTE
         else:
@@ -193,7 +201,9 @@ def planned(situation: Situation, costs: PlaceCosts) -> Outcome:
         ordered = _ordered(found, start, situation, network)
         cells = ordered[0].route
         cost = costs.cost(CostLayer.BESIDE)
-        line = straightened(cells, cost, costs.is_clear, network.origin)
+        line = cells.astype(np.float64)
+        if not is_flat:
+            line = straightened(cells, cost, costs.is_clear, network.origin)
         return outcome(
             state=PlanState.READY,
             goals=[visit.goal.id for visit in ordered],
@@ -279,7 +289,7 @@ def _ordered(
     found: Sequence[Visit], start: Cell, situation: Situation, network: PlaceNetwork
 ) -> list[Visit]:
     """Return the visits in an order that makes the tour short; in that of the plan before, while it
-    is nearly as short.
+    is nearly as short. On a flat grid the nearest is always next.
     """
     before = situation.before
     cells = np.array([start, *(visit.route[-1] for visit in found)])
@@ -288,6 +298,10 @@ def _ordered(
     for number, visit in enumerate(found, start=1):
         lengths_m[:, number] = visit.field.distance_m[i, j]
         lengths_m[number, :] = lengths_m[:, number]
+
+    if situation.config.planning == "gradient":
+        order = follow_activation(lengths_m)
+        return [found[number - 1] for number in order.tolist()[1:]]
 
     order = order_from(lengths_m, cells * network.cell_m, TourSettings())
     names = [visit.goal.id for visit in found]
