@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+import msgspec
 import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.estimation.pairwise_consistency import MIN_AGREEING
-from cogmap.geometry.se2 import transform_from
+from cogmap.geometry.se2 import relative, transform_from
 from cogmap.graph.graph import Graph
 from cogmap.graph.path import rows_of
 from cogmap.runtime.codelet import Answer, Codelet, CycleContext
@@ -172,6 +173,10 @@ def _closure_by_landmark(
     if is_range_alone(percept):
         return _closure_by_range(percept, task, landmark)
 
+    to_ns = task.stamp_ns
+    if config.closes_by == "sighting" and not path_grows(graph, config):
+        percept, to_ns = _seen_from_path(percept, graph)
+
     # The pass before ended where `newest` began this one, or the landmark was last seen.
     before_ns, view = landmark.last_seen_ns, 0
     if newest is not None and newest.to_ns > task.stamp_ns - config.revisit_s * 1e9:
@@ -207,7 +212,7 @@ def _closure_by_landmark(
         id=f"closure:{task.cycle}:{percept.label}",
         base_level=1.0,
         from_ns=round(from_s * 1e9),
-        to_ns=task.stamp_ns,
+        to_ns=to_ns,
         cue=percept.label,
         ahead_m=ahead_m,
         left_m=left_m,
@@ -218,6 +223,28 @@ def _closure_by_landmark(
         before_ns=before_ns,
         view=view + 1,
     )
+
+
+def _seen_from_path(percept: Percept, graph: Graph) -> tuple[Percept, int]:
+    """Return a percept as it is seen from the path's last place, and when the agent was there.
+
+    It may have turned on the spot since then. Of several views that must agree, one may be wrong by
+    that; of one, none.
+    """
+    agent = graph.agent
+    last = graph.last_segment
+    assert agent is not None
+    assert last is not None
+
+    row = last.rows.numpy()[-1]
+    step = relative(row[ODOMETRY], agent.odometry.pose())
+    ahead_m = percept.range_m * math.cos(percept.bearing_rad)
+    left_m = percept.range_m * math.sin(percept.bearing_rad)
+    x_m, y_m = transform_from(step, np.array([ahead_m, left_m])).tolist()
+    seen = msgspec.structs.replace(
+        percept, range_m=math.hypot(x_m, y_m), bearing_rad=math.atan2(y_m, x_m)
+    )
+    return seen, round(float(row[STAMP]) * 1e9)
 
 
 def _closure_by_range(percept: Percept, task: Task, landmark: Object) -> LoopClosure:

@@ -157,3 +157,42 @@ def _matrix(cost: np.ndarray) -> sparse.csr_matrix:
                 at = (i * height + j, (i + di) * height + j + dj)
                 links[at] = math.hypot(di, dj) * dearer
     return links.tocsr()
+
+
+def _corners(first_east: float) -> PlaceNetwork:
+    """Four places in a square: from (0, 0) a link of this weight leads to (1, 0), from where the
+    goal (1, 1) costs 1 m, and others of 2 m each lead over (0, 1). There is no diagonal.
+    """
+    weights = np.zeros((len(LINK_OFFSETS), 2, 2), np.float32)
+    east, _, north, _ = weights
+    east[0, 0] = first_east
+    north[1, 0] = 1.0
+    north[0, 0] = 0.5
+    east[0, 1] = 0.5
+    return PlaceNetwork((0, 0), 1.0, weights)
+
+
+def test_a_route_can_follow_the_neighbour_with_the_highest_activation() -> None:
+    field = spread(_corners(0.1), np.array([[1, 1]]))
+    highest = field.ascend((0, 0))
+    passed_most_on = field.climb((0, 0))
+
+    assert field.log_activation.tolist() == [[-8.0, -4.0], [-2.0, 0.0]]
+    assert highest is not None
+    assert passed_most_on is not None
+    assert highest.tolist() == [[0, 0], [1, 0], [1, 1]]
+    assert passed_most_on.tolist() == [[0, 0], [0, 1], [1, 1]]
+
+
+def test_no_route_rises_over_a_link_that_is_cut() -> None:
+    field = spread(_corners(0.0), np.array([[1, 1]]))
+    highest = field.ascend((0, 0))
+
+    assert highest is not None
+    assert highest.tolist() == [[0, 0], [0, 1], [1, 1]]
+
+
+def test_no_route_rises_where_no_activation_arrives() -> None:
+    field = spread(grid_network(_wall()), np.array([[6, 0]]))
+
+    assert field.ascend((0, 0)) is None

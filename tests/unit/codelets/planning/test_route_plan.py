@@ -286,3 +286,27 @@ def test_a_gap_as_wide_as_the_robot_is_passed() -> None:
 
     assert plan.route is not None
     assert plan.route.numpy()[:, 1].max() <= 3.0
+
+
+GRADIENT = Config(planning="gradient")
+
+
+def test_on_a_flat_grid_a_route_goes_from_place_to_place() -> None:
+    plan = planned(loop(goal_at("corner", 57.0, 40.0)), GRADIENT)
+
+    assert plan.route is not None
+    steps = np.abs(np.diff(plan.route.numpy(), axis=0))
+    assert (steps.max(axis=1) == 1.0).all()
+    assert plan.route.numpy()[-1] == pytest.approx((57.0, 40.0))
+
+
+def test_on_a_flat_grid_the_nearest_goal_is_always_next() -> None:
+    """The agent is at (3, 0): north is 12 m away, east 10 m, and so the tour begins north, the
+    flat one east (figure 5 C).
+    """
+    goals = [goal_at("north", 3.0, 12.0), goal_at("east", 13.0, 0.0), goal_at("far", 25.0, 0.0)]
+
+    flat = [goal_id("east"), goal_id("far"), goal_id("north")]
+    assert planned(loop(*goals), GRADIENT).goals == flat
+    short = [goal_id("north"), goal_id("east"), goal_id("far")]
+    assert planned(loop(*goals)).goals == short
