@@ -31,8 +31,8 @@ OTHERS = 500_000
 
 
 def fitted(environments: Sequence[Environment], budget: Budget) -> Noise:
-    """Fit speed and turn noise by which maps corrected by the paper's rule err as people's do, by
-    coordinate descent.
+    """Fit speed and turn noise, by coordinate descent, so that maps whose positions alone are
+    corrected err as people's do.
 
     There is one mean for two noises: others would fit as well. The traversals are others than those
     measured with the same seed.

@@ -30,7 +30,8 @@ def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
     """Return every metric that is printed or drawn.
 
     `error_corrected_over_uncorrected` is the mean over the maps of each one's ratio of mean errors.
-    Corrected is with headings, beyond the paper; `positions` is the paper's own rule. Uncorrected
+    Corrected is with headings, beyond the paper; `positions` corrects these alone, by reverse
+    replay or, with the paper's rules, by eq. 9 as it is printed. Uncorrected
     is the map of an agent that recognises landmarks but closes no loops; `wheels_alone` the map by
     path integration alone, which without images is that of the wheels.
     """

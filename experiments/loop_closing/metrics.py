@@ -22,7 +22,8 @@ def loop_metrics(loops: Mapping[str, Loop]) -> Metrics:
     """Return errors before and after the first correction and in the end, by the method of
     correction.
 
-    `positions` is the paper's own rule (eq. 9), `heading` ours. `path_error_wheels_alone_m` and
+    `positions` corrects these alone, by reverse replay or, with the paper's rules, by eq. 9 as it
+    is printed; `heading` is ours. `path_error_wheels_alone_m` and
     `path_error_fused_alone_m` are of the path by path integration alone: of the wheels, and of
     self-motion as the agent has it; they are the same if no images are taken.
     """

@@ -161,12 +161,12 @@ def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config:
 
 
 def _by_paper(landmark: Object, percept: Percept, agent: Self, task: Task) -> Object:
-    """Keep the positions by eq. 4 as it is printed, seen from the mean of the self's samples, and
-    count in how many views there were any, or in how many in a row there were none.
+    """Keep the positions by eq. 4 as it is printed, and count in how many views there were any, or
+    in how many in a row there were none.
     """
-    pose = mean_pose(agent.samples.numpy())
     rng = generator(f"{task.task_id}/{percept.label}")
-    kept_m, share = paper_rule.landmark(landmark.positions_m(), pose, percept, rng)
+    selves = agent.samples.numpy()
+    kept_m, share = paper_rule.landmark(landmark.positions_m(), selves, percept, rng)
     if not share:
         return msgspec.structs.replace(landmark, misses=landmark.misses + 1)
 

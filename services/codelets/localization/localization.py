@@ -104,12 +104,12 @@ CODELET = Codelet(
 
 
 def _by_paper(step: Step, config: Config, rng: np.random.Generator) -> Localized:
-    """Localize as the paper prints it: every known landmark in view counts, from where the agent
-    stands too.
+    """Localize as the paper prints it: every landmark in view counts, from its first sighting on,
+    and from where the agent stands too.
     """
     agent = step.agent
     samples = paper_rule.moved(agent.samples.numpy(), step.motions, config, rng)
-    seen = measurements(step.task.percepts, step.graph, config.largest_landmark_sd_m, NEVER_NS)
+    seen = measurements(step.task.percepts, step.graph, config.largest_landmark_sd_m, NEVER_NS, 1)
     share = 1.0
     if seen is not None:
         samples, share = paper_rule.corrected(samples, seen, rng)

@@ -151,21 +151,25 @@ def cost_of_mistake() -> float:
 
 
 def measurements(
-    percepts: Iterable[Percept], graph: Graph, largest_sd_m: float, stationary_since_ns: int
+    percepts: Iterable[Percept],
+    graph: Graph,
+    largest_sd_m: float,
+    stationary_since_ns: int,
+    min_sightings: int = MIN_SIGHTINGS,
 ) -> Measurements | None:
     """Choose the percepts whose object on the map is known well enough to inform; None without any.
 
     The object must be known to `largest_sd_m`, and to half of its distance: samples on a ring
     around the agent have their mean where nothing is. It must also have been seen at least
-    MIN_SIGHTINGS times, since a first sighting may have had another's name, and not from where the
-    agent has stood since `stationary_since_ns`: the same view again is no new evidence.
+    `min_sightings` times, since a first sighting may have had another's name, and not from where
+    the agent has stood since `stationary_since_ns`: the same view again is no new evidence.
     """
     chosen: list[Percept] = []
     means_m = []
     covariances_m2 = []
     for percept in percepts:
         node = graph.get(Object, object_id(percept.label))
-        if node is None or not (node.surveyed or node.sightings >= MIN_SIGHTINGS):
+        if node is None or not (node.surveyed or node.sightings >= min_sightings):
             continue
         if is_seen_from_here(node, stationary_since_ns):
             continue

@@ -1,9 +1,10 @@
 """Localization as the paper prints it (§5.4, eq. 1-4, table 1): pure functions of samples.
 
-The samples of a step start from the mean of those before. Each is kept with the likelihood of all
-views at it, relative to that of a perfect match, and nothing else is done to it. If none is kept,
-the samples before the view stay: the views contradict what self-motion has left possible, and the
-paper has no rule for that.
+The samples of a step start from the mean of those before. Each is kept with a probability in
+proportion to the likelihood of all views there, 1 for the likeliest, and nothing else is done to
+it. If all likelihoods are 0 in double precision, no sample is left, and those before the view stay:
+the views contradict what self-motion has left possible, and the paper has no rule for that. (With
+probabilities relative to a perfect match, most views would leave none of some hundred samples.)
 """
 
 from __future__ import annotations
@@ -18,26 +19,19 @@ from cogmap.services.codelets.localization.measurement_model import Measurements
 from cogmap.services.codelets.localization.motion_model import COLUMNS, move
 from cogmap.services.codelets.localization.sampling import resample
 
-# Of a self-motion's five numbers: its rates and their standard deviations.
-RATES = (0, 1)
-RATE_SDS = (3, 4)
-
 
 def moved(samples: Floats, motions: Floats, config: Config, rng: np.random.Generator) -> Floats:
     """Move `config.samples` samples (n, 7), without gains, from the mean pose of those before,
     (k, 3) or more columns, by (m, 5) motions.
 
-    s_i = mean(s) + T(v dt N(1, diag(sigma_v^2, sigma_w^2))): sigma_v and sigma_w are what the sense
-    states of its noise, as shares of the rate; a rate of 0 has no noise. Each reading of the sense
-    has noise of its own.
+    s_i = mean(s) + T(v dt N(1, diag(sigma_v^2, sigma_w^2))): a factor with a mean of one adds to a
+    rate noise of sigma times the rate, and that is what the sense states of each reading. (One that
+    was not felt at all has a deviation, though it is 0: a disoriented agent's turn.)
     """
     start = np.zeros((config.samples, COLUMNS))
     start[:, :3] = mean_pose(samples)
 
-    multiplied = motions.copy()
-    for rate, sd in zip(RATES, RATE_SDS, strict=True):
-        multiplied[motions[:, rate] == 0, sd] = 0.0
-    return move(start, multiplied, Config(), rng)
+    return move(start, motions, Config(), rng)
 
 
 def corrected(
@@ -53,16 +47,17 @@ def corrected(
 
 
 def landmark(
-    positions_m: Floats, pose: Floats, percept: Percept, rng: np.random.Generator
+    positions_m: Floats, selves: Floats, percept: Percept, rng: np.random.Generator
 ) -> tuple[Floats, float]:
-    """Reject (n, 2) samples of a landmark's position by p(o | l, x), seen from `pose` (3,) (eq. 4).
-    Return as many as before, those that are kept repeated, and the share that is kept: 0 if none
-    is, and all stay.
+    """Reject (n, 2) samples of a landmark's position by p(o | l, x), each seen from one of (k, 3 or
+    more) samples of the self, drawn at random (eq. 4). Return as many as before, those that are
+    kept repeated, and the share that is kept: 0 if none is, and all stay.
     """
     squared = np.zeros(len(positions_m))
-    offset_m = positions_m - pose[:2]
+    poses = selves[rng.integers(len(selves), size=len(positions_m))]
+    offset_m = positions_m - poses[:, :2]
     if percept.has_bearing:
-        bearing_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0]) - pose[2]
+        bearing_rad = np.arctan2(offset_m[:, 1], offset_m[:, 0]) - poses[:, 2]
         residual_rad = wrap_angle(bearing_rad - percept.bearing_rad)
         squared += (residual_rad / percept.bearing_sd_rad) ** 2
     if percept.has_range:
@@ -74,10 +69,14 @@ def landmark(
 
 
 def _kept(samples: Floats, squared: Floats, rng: np.random.Generator) -> tuple[Floats, float]:
-    """Keep each of (n, d) samples with probability exp(-squared / 2), all if none is kept; return
-    the share that is kept.
+    """Keep each of (n, d) samples with its likelihood exp(-squared / 2) over that of the likeliest;
+    return the share that is kept. All stay, and the share is 0, if each likelihood is 0 in double
+    precision.
     """
-    is_kept = rng.random(len(samples)) < np.exp(-squared / 2)
-    if not is_kept.any():
+    likelihood = np.exp(-squared / 2)
+    largest = float(likelihood.max())
+    if largest == 0.0:
         return samples, 0.0
+
+    is_kept = rng.random(len(samples)) * largest < likelihood
     return samples[is_kept], float(is_kept.mean())
