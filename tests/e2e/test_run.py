@@ -89,6 +89,20 @@ def test_the_summary_comes_as_json_too(start: Callable[..., Run]) -> None:
     assert json.loads(last)["completed"]
 
 
+def test_a_drive_by_the_papers_rules_names_them_and_what_overrides_them(
+    start: Callable[..., Run],
+) -> None:
+    drive = ("--lockstep", "--laps", "0.02", "--no-record", "--json")
+    run = start(*drive, "--rules", "paper", "--set", "codelets.correct=heading")
+    assert run.end() == 0, run.output()
+
+    used = {"localization": "paper", "closes_by": "sighting", "planning": "gradient"}
+    summary = run.summary()
+    assert {rule: summary[f"rules_{rule}"] for rule in used} == used
+    assert summary["rules_correct"] == "heading"
+    assert "rules: localization paper, closes_by sighting, correct heading" in run.output()
+
+
 def test_ctrl_c_ends_a_drive_cleanly(start: Callable[..., Run]) -> None:
     run = start()
     run.wait_for(DRIVING)
