@@ -13,6 +13,7 @@ import msgspec
 import numpy as np
 from scipy.special import chdtri
 
+from cogmap.estimation import printed_rule
 from cogmap.estimation.alignment import motion_onto
 from cogmap.estimation.gnc import inliers
 from cogmap.estimation.least_squares import optimize
@@ -30,8 +31,6 @@ from cogmap.estimation.pose_graph import (
     matvec,
     residuals,
 )
-from cogmap.estimation.printed_rule import Loops
-from cogmap.estimation.printed_rule import close_loops as close_loops_as_printed
 from cogmap.estimation.reverse_replay import close_loops, with_positions_only
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import (
@@ -297,10 +296,10 @@ def shifted(rows: Floats, judgement: Judgement, config: Config) -> tuple[Floats,
     views = judgement.accepted
     there_m = rotate(views.there_m, poses[views.i, 2])
     here_m = rotate(views.here_m, poses[views.j, 2])
-    loops = Loops(views.i, views.j, here_m - there_m, views.sd_m**2)
+    loops = printed_rule.Loops(views.i, views.j, here_m - there_m, views.sd_m**2)
 
     step_m2 = steps_of(rows, config).variance_m2
-    positions_m, replays = close_loops_as_printed(poses[:, :2], loops, step_m2)
+    positions_m, replays = printed_rule.close_loops(poses[:, :2], loops, step_m2)
     return np.column_stack([positions_m, poses[:, 2]]), replays
 
 

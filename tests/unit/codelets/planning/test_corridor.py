@@ -74,6 +74,17 @@ def test_a_rough_route_is_nearly_as_short_as_one_over_the_whole_map() -> None:
     assert whole.length_m <= rough.length_m <= 1.05 * whole.length_m
 
 
+def test_the_papers_gradient_leads_over_the_finest_map_alone() -> None:
+    gradient = msgspec.structs.replace(ROUGH, planning="gradient")
+    graph = _city(FAR)
+    graph.change([DropPlaces(map=each.id) for each in graph.of_kind(Map) if each.id != ROOT_MAP])
+    plan = _plan(graph, gradient)
+
+    assert plan.state is PlanState.READY
+    assert plan.length_m == pytest.approx(_plan(_city(FAR), gradient).length_m)
+    assert plan.length_m >= _plan(_city(FAR), FLAT).length_m
+
+
 def test_a_corridor_holds_the_plan_and_little_else() -> None:
     graph = _city(FAR)
     assert graph.agent is not None
