@@ -3,8 +3,7 @@
 The samples of a step start from the mean of those before. Each is kept with a probability in
 proportion to the likelihood of all views there, 1 for the likeliest, and nothing else is done to
 it. If all likelihoods are 0 in double precision, no sample is left, and those before the view stay:
-the views contradict what self-motion has left possible, and the paper has no rule for that. (With
-probabilities relative to a perfect match, most views would leave none of some hundred samples.)
+the views contradict what self-motion has left possible, and the paper has no rule for that.
 """
 
 from __future__ import annotations
