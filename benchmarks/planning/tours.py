@@ -14,6 +14,7 @@ from cogmap.data import tsplib
 from cogmap.data.human_tours import read_folder
 from cogmap.data.tsplib import Problem
 from cogmap.errors import UsageError
+from cogmap.experiments.route_planning import cross_validation
 from cogmap.experiments.route_planning.measure import PARTICIPANTS, human_jobs, measure
 from cogmap.experiments.route_planning.metrics import human_metrics
 from cogmap.experiments.route_planning.optimum import shortest_tour
@@ -27,6 +28,8 @@ THRESHOLDS = {
 MIN_CITIES = 50
 MAX_CITIES = 80
 SEED = 1
+# Of each of the assumptions that are compared.
+CANDIDATE_PARTICIPANTS = 100
 
 
 class _Excess(NamedTuple):
@@ -83,13 +86,25 @@ def measure_tsp(folder: Path, processes: int) -> Metrics:
 
 
 def measure_human(folder: Path, processes: int) -> Metrics:
-    """Measure how far the model's participants agree with the people of a folder of tours."""
+    """Measure how far the model's participants agree with the people of a folder of tours.
+
+    What is assumed of participants is chosen by leaving out one problem at a time:
+    `within_iqr_share` is the share of problems left out on which they agree. Raises UsageError if
+    there are too few problems for that.
+    """
     problems = read_folder(folder)
     jobs = human_jobs(problems, PARTICIPANTS, SEED)
     with bar("planning people's problems") as progress:
         planned = measure(jobs, processes, progress)
 
-    return human_metrics(planned)
+    with bar("planning by other assumptions") as progress:
+        compared = cross_validation.measure(
+            problems, CANDIDATE_PARTICIPANTS, SEED, processes, progress
+        )
+
+    defaults = human_metrics(planned)
+    defaults["within_iqr_share_of_defaults"] = defaults.pop("within_iqr_share_in_sample")
+    return defaults | cross_validation.metrics(compared)
 
 
 def _excess(job: _Job) -> _Excess:

@@ -20,8 +20,9 @@ def human_metrics(problems: Sequence[Planned]) -> Metrics:
     """Return metrics of the problems that people drew tours of: each, and how far the model agrees
     with people.
 
-    `within_iqr_share` is the share of problems on which the median of the model's participants lies
-    within people's quartiles. Correlations are over the problems, of mean with mean.
+    `within_iqr_share_in_sample` is the share of problems on which the median of the model's
+    participants lies within people's quartiles; what is assumed of them was chosen on problems of
+    people. Correlations are over the problems, of mean with mean.
     """
     if not problems:
         return {}
@@ -30,7 +31,7 @@ def human_metrics(problems: Sequence[Planned]) -> Metrics:
     is_within = [problem.is_within_quartiles for problem in problems]
     metrics: Metrics = {
         "human_problems": float(len(problems)),
-        "within_iqr_share": float(np.mean(is_within)),
+        "within_iqr_share_in_sample": float(np.mean(is_within)),
         "human_people_above_optimum": float(people.mean()),
     }
 

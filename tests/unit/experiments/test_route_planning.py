@@ -9,7 +9,10 @@ import pytest
 
 from cogmap.data.human_tours import HumanTours
 from cogmap.data.tsplib import EUC_2D, Problem, straight
-from cogmap.experiments.route_planning import activation, published
+from cogmap.errors import UsageError
+from cogmap.experiments.route_planning import activation, cross_validation, published
+from cogmap.experiments.route_planning.cross_validation import CANDIDATES, Compared
+from cogmap.experiments.route_planning.crossings import uncrossed
 from cogmap.experiments.route_planning.measure import (
     Planned,
     drawn_jobs,
@@ -19,7 +22,13 @@ from cogmap.experiments.route_planning.measure import (
 )
 from cogmap.experiments.route_planning.metrics import correlation, drawn_metrics, human_metrics
 from cogmap.experiments.route_planning.optimum import shortest_tour
-from cogmap.experiments.route_planning.participants import tours_of
+from cogmap.experiments.route_planning.participants import (
+    DEFAULT,
+    Revision,
+    Start,
+    tours_of,
+    tours_under,
+)
 from cogmap.geometry.arrays import Floats
 from cogmap.services.codelets.planning.tours import route_length
 
@@ -109,7 +118,7 @@ def test_the_model_is_within_people_where_its_median_is_within_quartiles() -> No
 
     assert inside.is_within_quartiles
     assert not outside.is_within_quartiles
-    assert human_metrics([inside, outside])["within_iqr_share"] == 0.5
+    assert human_metrics([inside, outside])["within_iqr_share_in_sample"] == 0.5
 
 
 def test_errors_correlate_over_problems_by_their_means() -> None:
@@ -145,3 +154,93 @@ def test_routes_of_figure_5_follow_activation_and_go_round_walls() -> None:
         assert ground.route[0].tolist() == list(activation.START)
         assert ground.route[-1].tolist() == list(activation.GOAL)
     assert len(round_walls.route) > len(straight_on.route) + 10
+
+
+def test_a_tour_that_is_uncrossed_is_a_shorter_one_past_all_goals() -> None:
+    positions = _goals(25)
+    by_length = straight(positions)
+    crossed = np.random.default_rng(1).permutation(25)
+
+    found = uncrossed(crossed, positions)
+    again = uncrossed(found, positions)
+
+    assert sorted(found.tolist()) == list(range(25))
+    before = route_length(by_length, crossed, closed=True)
+    assert route_length(by_length, found, closed=True) < before
+    assert again.tolist() == found.tolist()
+
+
+def test_a_square_drawn_across_is_drawn_around_once_uncrossed() -> None:
+    square = np.array([[0.0, 0.0], [9.0, 9.0], [0.0, 9.0], [9.0, 0.0]])
+
+    found = uncrossed(np.arange(4), square)
+
+    assert route_length(straight(square), found, closed=True) == pytest.approx(36.0)
+
+
+def test_participants_differ_by_what_is_assumed_of_them() -> None:
+    positions = _goals(20)
+    by_length = straight(positions)
+    mean = {}
+    for revision in Revision:
+        assumptions = DEFAULT._replace(start=Start.GIVEN, revision=revision)
+        tours = tours_under(assumptions, by_length, positions, 10, seed=3, given=7)
+        lengths = [route_length(by_length, tour, closed=True) for tour in tours]
+        mean[revision] = np.mean(lengths)
+
+        for tour in tours:
+            assert tour[0] == 7 or revision is Revision.CROSSINGS
+            assert sorted(tour.tolist()) == list(range(20))
+
+    assert mean[Revision.STRAIGHTENED] <= mean[Revision.CROSSINGS] <= mean[Revision.NONE]
+
+
+def test_the_default_participants_are_one_of_the_candidates() -> None:
+    positions = _goals(12)
+    by_length = straight(positions)
+
+    expected = tours_of(by_length, positions, 4, seed=3).hierarchical
+    tours = tours_under(DEFAULT, by_length, positions, 4, seed=3, given=5)
+
+    assert DEFAULT in CANDIDATES
+    assert [tour.tolist() for tour in tours] == [tour.tolist() for tour in expected]
+
+
+def _compared(name: str, *nearest: int) -> Compared:
+    """A problem on which those candidates agree with people exactly, and the others do not."""
+    medians = np.full(len(CANDIDATES), 0.9)
+    medians[list(nearest)] = 0.2
+    return Compared(name, np.array([0.0, 0.1, 0.2, 0.3, 0.4]), medians)
+
+
+def test_a_problem_is_compared_by_what_was_chosen_on_the_others() -> None:
+    """Each problem alone would have another candidate, and the last agrees with the others'."""
+    problems = [_compared("Graph0", 1, 3), _compared("Graph1", 1, 4), _compared("Graph2", 3, 4)]
+
+    metrics = cross_validation.metrics(problems)
+
+    assert metrics["within_iqr_share"] == 0.0
+    assert metrics["within_iqr_share_in_sample"] == pytest.approx(2 / 3)
+    assert metrics["folds_that_agree_share"] == pytest.approx(1 / 3)
+    assert metrics["graph2_left_out_span"] == np.mean(CANDIDATES[1].spans)
+
+
+def test_one_problem_alone_cannot_be_left_out() -> None:
+    with pytest.raises(UsageError, match="at least 2"):
+        cross_validation.metrics([_compared("Graph0", 1)])
+
+
+def test_candidates_are_compared_on_real_tours_of_people() -> None:
+    problems = []
+    for seed in range(2):
+        positions = _goals(5, seed)
+        best = shortest_tour(straight(positions))
+        problem = Problem(f"Graph{seed}", EUC_2D, positions)
+        problems.append(HumanTours(problem, [best, best[::-1], np.arange(5)]))
+
+    compared = cross_validation.measure(problems, 2, 1, 1, lambda share: None)
+    metrics = cross_validation.metrics(compared)
+
+    assert [problem.name for problem in compared] == ["Graph0", "Graph1"]
+    assert all((problem.medians >= 0).all() for problem in compared)
+    assert 0.0 <= metrics["within_iqr_share"] <= 1.0
