@@ -11,8 +11,12 @@ from cogmap.experiments.city_maps.metrics import map_metrics
 from cogmap.experiments.city_maps.sources import grown_environments
 from cogmap.experiments.cue_integration import run as cue_integration
 
+# Of SDs: within a quarter of those of the published simulation.
 CUE_INTEGRATION_THRESHOLDS = {
     "sd_both_over_optimal": within(0.9, 1.1),
+    "landmark_sd_m": within(0.30, 0.50),
+    "both_sd_m": within(0.2025, 0.3375),
+    "conflict_sd_m": within(0.2325, 0.3875),
     "integration_over_alternation": more_than(0),
 }
 CITY_MAPS_THRESHOLDS = {"error_corrected_over_uncorrected": at_most(0.25)}

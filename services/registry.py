@@ -79,6 +79,14 @@ def taking_part(body: str = SIM) -> tuple[str, ...]:
 
 def codelets() -> tuple[Codelet, ...]:
     """Return all codelets to run: ours, and those of other packages. Raises ConfigError."""
+    return _codelets_found_on(tuple(sys.path))
+
+
+@cache
+def _codelets_found_on(path: tuple[str, ...]) -> tuple[Codelet, ...]:
+    """Return all codelets, where packages are found on that `path`: to look for packages takes as
+    long as to build a module.
+    """
     from cogmap.services.codelets.table import all_codelets
 
     return all_codelets()

@@ -12,7 +12,6 @@ from matplotlib.patches import Ellipse
 from cogmap.cli.plots.palette import ESTIMATE, FAINT, FUSED, INK, KERB, OBJECT, SEVERAL, TRUE
 from cogmap.cli.plots.sheet import describe, new_sheet
 from cogmap.experiments.cue_integration import published
-from cogmap.experiments.cue_integration.analysis import rmse_m
 from cogmap.experiments.cue_integration.geometry import LANDMARKS, POSTS, ROUTES, START, Points
 from cogmap.experiments.cue_integration.run import Outcome
 from cogmap.experiments.cue_integration.trial import Condition
@@ -37,9 +36,10 @@ OPTIMAL = TRUE
 def figure(found: Outcome) -> Figure:
     """Draw the sheet: the room, the responses, and their SD and RMSE by condition."""
     noise = found.noise
+    trials = len(found.errors_m[Condition.BOTH])
     title = (
-        f"Cue integration in Nardini's room, {len(found.errors_m[Condition.BOTH])} trials a "
-        f"condition\nsimulated senses err by {noise.distance:.0%} of distance, "
+        f"Cue integration in Nardini's room, {trials} trials a condition\n"
+        f"simulated senses err by {noise.landmark:.0%} of a landmark's distance, "
         f"{noise.speed:.0%} of speed and {noise.turn:.0%} of turn rate"
     )
     with new_sheet(13, 7.6, title, dpi=130) as sheet:
@@ -54,7 +54,7 @@ def figure(found: Outcome) -> Figure:
         )
         panels["sd"].legend(frameon=False, fontsize=8, loc="upper right")
 
-        rmses_m = {condition: rmse_m(found.errors_m[condition]) for condition in Condition}
+        rmses_m = {condition: found.rmse_m(condition) for condition in Condition}
         _draw_bars(panels["rmse"], rmses_m, published.RMSE_M, "d   RMSE of the responses")
     return sheet
 
@@ -84,7 +84,7 @@ def _draw_responses(axes: Axes, found: Outcome) -> None:
     for condition, errors_m in found.errors_m.items():
         colour = COLOURS[condition]
         axes.plot(*errors_m.T, ".", ms=3, color=colour, alpha=0.5)
-        axes.add_patch(_one_sd(errors_m, colour))
+        axes.add_patch(_one_sd(found.kept_m(condition), colour))
         axes.plot([], [], color=colour, lw=2, label=NAMES[condition])
     for x_m, name in ((0.0, "where it stood"), (found.shift_m, "where turned landmarks say")):
         axes.plot(x_m, 0, "+", ms=12, mew=2, color=TRUE)

@@ -70,7 +70,7 @@ def typed(sections: Sections, name: str, kind: type[C]) -> C:
     Raises ConfigError that names the key or the value, also if a number is not finite.
     """
     section = sections.get(name, {})
-    fields = [field.encode_name for field in msgspec.structs.fields(kind)]
+    fields = list(kind.__struct_encode_fields__)
     for key, value in section.items():
         if key not in fields:
             raise ConfigError(f"unknown key {key!r} in [{name}]{_nearest(key, fields)}")
@@ -86,7 +86,7 @@ def recorded(sections: Sections, name: str, kind: type[C]) -> C:
     """Convert section `name` of a log to a `kind`, without the keys that another version had.
     Raises ConfigError as `typed` does.
     """
-    fields = {field.encode_name for field in msgspec.structs.fields(kind)}
+    fields = set(kind.__struct_encode_fields__)
     section = sections.get(name, {})
     return typed({name: {key: section[key] for key in section.keys() & fields}}, name, kind)
 

@@ -10,10 +10,14 @@ import numpy as np
 
 from cogmap.experiments.cue_integration.geometry import CONFLICT_RAD, Points
 from cogmap.experiments.cue_integration.trial import Response, Trial
+from cogmap.geometry.arrays import Booleans
 from cogmap.geometry.se2 import rotate
 
 FAR = 5.0
 SHARES = 201
+# A response in a hundred may be of a participant who is lost: anywhere in the room.
+LOST_SHARE = 0.01
+ROOM_M2 = 49.0
 
 
 def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
@@ -69,16 +73,22 @@ def rmse_m(errors_m: Points) -> float:
     return float(np.sqrt(mean_m2))
 
 
-def lost(errors_m: Points) -> int:
-    """Return how many responses lie where no normal distribution has any: FAR times the median
+def is_lost(errors_m: Points) -> Booleans:
+    """Return which (n,) responses lie where no normal distribution has any: FAR times the median
     distance from the median.
     """
     offsets_m = errors_m - np.median(errors_m, axis=0)
     distances_m = np.hypot(*offsets_m.T)
 
     far_m = FAR * np.median(distances_m)
-    is_lost = distances_m > far_m
-    return int(is_lost.sum())
+    return np.asarray(distances_m > far_m)
+
+
+def robust(log_densities: Points) -> Points:
+    """Return the log densities (n,) of responses of which LOST_SHARE are anywhere in the room."""
+    kept = np.log(1 - LOST_SHARE) + log_densities
+    anywhere = np.log(LOST_SHARE / ROOM_M2)
+    return np.asarray(np.logaddexp(kept, anywhere))
 
 
 def landmark_weight(self_motion_sd_m: float, landmarks_sd_m: float) -> float:
@@ -156,11 +166,11 @@ def alternation_log_densities(
 def best_alternation_log_likelihood(
     conflict_m: Points, self_motion: Gaussian, landmarks: Gaussian
 ) -> float:
-    """Return the log likelihood of the same, with the share that makes it greatest."""
+    """Return the robust log likelihood of the same, with the share that makes it greatest."""
     likelihoods = []
 
     for share in np.linspace(0.0, 1.0, SHARES).tolist():
         densities = alternation_log_densities(conflict_m, self_motion, landmarks, share)
-        likelihoods.append(float(densities.sum()))
+        likelihoods.append(float(robust(densities).sum()))
 
     return max(likelihoods)

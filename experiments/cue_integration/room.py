@@ -55,7 +55,7 @@ class Room:
         self._to_pick = list(trial.route)
         self._frame = 0
         self._are_lit = True
-        self._knows_motion = True
+        self._feels_steps = True
         self.response: Response | None = None
 
     def begin(self) -> list[Message]:
@@ -89,7 +89,7 @@ class Room:
 
         self._pose = there
         felt = senses.self_motion(turn_rad, forward_m, self._trial.noise, self._rng)
-        motions = felt if self._knows_motion else senses.UNKNOWN
+        motions = felt if self._feels_steps else senses.UNKNOWN
         return self._sensed(motions, self._seen(picked))
 
     def close(self) -> None:
@@ -107,7 +107,7 @@ class Room:
         if condition is not Condition.LANDMARKS:
             return self._sensed(senses.STANDING, [])
 
-        self._knows_motion = False
+        self._feels_steps = not self._trial.noise.unfelt
         heading_rad = float(self._rng.uniform(-math.pi, math.pi))
         self._pose = Pose(self._pose.x_m, self._pose.y_m, heading_rad)
         return self._sensed(senses.DISORIENTED, [])
@@ -118,7 +118,7 @@ class Room:
 
         if self._are_lit:
             for number, position in enumerate(self._landmarks):
-                things[f"landmark-{number}"] = position
+                things[f"{senses.LANDMARK}{number}"] = position
 
         things |= picked
         return senses.sightings(self._pose, things, self._trial.noise, self._rng)

@@ -7,11 +7,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from cogmap.experiments.cue_integration.geometry import STEP_M, STEP_RAD, Point, Pose
-from cogmap.experiments.cue_integration.trial import Noise
+from cogmap.experiments.cue_integration.trial import DISTANCE, Noise
 from cogmap.schemas.sensing import Percept
 
 Rows = list[tuple[float, float, float, float, float]]
 HALF_S = 0.25
+LANDMARK = "landmark-"
+# A direction that is not sensed.
+UNKNOWN_RAD = np.pi
+# Of the distance: no noise makes a landmark be seen at the eye, or behind it.
+MIN_SHARE = 0.05
 STANDING: Rows = [(0.0, 0.0, HALF_S, 0.0, 0.0)]
 # Turned round and round until any heading is as likely as any other.
 DISORIENTED: Rows = [(0.0, 0.0, HALF_S, 0.0, 2 * np.pi / HALF_S)]
@@ -55,13 +60,18 @@ def sightings(
     pose: Pose, things: Mapping[str, Point], noise: Noise, rng: np.random.Generator
 ) -> list[Percept]:
     """Return percepts of all things, by label, wherever the participant faces: it looks around."""
-    sd = noise.distance
     seen = []
 
     for label, position in things.items():
+        is_landmark = label.startswith(LANDMARK)
+        sd = noise.landmark if is_landmark else DISTANCE
         true_bearing_rad, distance_m = pose.towards(position)
-        range_m = distance_m * float(rng.normal(1.0, sd))
+        range_m = distance_m * max(float(rng.normal(1.0, sd)), MIN_SHARE)
         bearing_rad = true_bearing_rad + float(rng.normal(0.0, sd))
+        bearing_sd_rad = sd
+        if is_landmark and noise.range_only:
+            bearing_rad = 0.0
+            bearing_sd_rad = UNKNOWN_RAD
         seen.append(
             Percept(
                 name=label,
@@ -70,7 +80,7 @@ def sightings(
                 evidence=1.0,
                 bearing_rad=bearing_rad,
                 range_m=range_m,
-                bearing_sd_rad=sd,
+                bearing_sd_rad=bearing_sd_rad,
                 range_sd_m=sd * range_m,
                 width_m=0.1,
                 height_m=0.1,

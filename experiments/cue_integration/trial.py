@@ -16,21 +16,29 @@ class Condition(enum.Enum):
     """What the participant may use on the way back (Nardini et al. 2008)."""
 
     SELF_MOTION = "self_motion"
-    LANDMARKS = "landmarks"
+    LANDMARKS = "landmark"
     BOTH = "both"
     CONFLICT = "conflict"
 
 
-class Noise(msgspec.Struct, frozen=True):
-    """Standard deviations as shares of what is sensed: of speed, of turn rate (fitted), and of
-    distance.
+# The paper's error of a distance (§6.1), as a share. What is touched errs by no more.
+DISTANCE = 0.03
 
-    Directions to landmarks err by as much across as distances do along.
+
+class Noise(msgspec.Struct, frozen=True):
+    """Standard deviations as shares of what is sensed: of speed, of turn rate, and of the distance
+    to a landmark.
+
+    Directions to landmarks err by as much across as distances do along; with `range_only` they are
+    not sensed (paper, table 1). With `unfelt`, disorientation takes away the steps that follow it,
+    too, not only the pose.
     """
 
     speed: float
     turn: float
-    distance: float = 0.03
+    landmark: float = DISTANCE
+    range_only: bool = False
+    unfelt: bool = False
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ def test_cue_integration_gives_the_same_bytes_through_real_processes(
     assert metrics["live_same"] == 1.0
     assert metrics["seed"] == 3
     assert "cue-integration --trials 8" in metrics["command"]
-    assert metrics["sd_both_m"] < metrics["sd_self_motion_m"]
+    assert metrics["both_sd_m"] < metrics["self_motion_sd_m"]
     assert metrics == json.loads((out / "cue-integration.json").read_text())
     assert (out / "cue-integration.png").read_bytes().startswith(b"\x89PNG")
     assert (out / "cue-integration.pdf").read_bytes().startswith(b"%PDF")
@@ -70,7 +70,7 @@ def test_route_planning_compares_people_the_model_and_the_shortest_tours(tmp_pat
     assert done.returncode == 0, done.stdout + done.stderr
 
     metrics = json.loads((out / "route-planning.json").read_text())
-    assert metrics["within_iqr_share"] == 1.0
+    assert metrics["within_iqr_share_in_sample"] == 1.0
     assert metrics["graph0_people_above_optimum_quartile_1"] == 0.0
     assert metrics["graph0_people_above_optimum_quartile_3"] > 0.0
     assert metrics["goals_030_hierarchical_above_optimum"] < metrics["goals_030_flat_above_optimum"]
