@@ -59,7 +59,8 @@ def measure(
     which is computed exactly if the folder does not give it. Takes up to a minute a problem.
 
     With --human-tours: by how much tours of simulated participants are longer than the shortest,
-    against those of people on the same problems. Takes about half a minute.
+    against those of people on the same problems. What is assumed of the participants is chosen by
+    leaving out one problem at a time. Takes some minutes.
 
     \b
     python -m benchmarks planning --grid Berlin_0_256.map --scen Berlin_0_256.map.scen

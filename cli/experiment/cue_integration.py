@@ -14,7 +14,6 @@ from cogmap.experiments.cue_integration import agent, camera_level
 from cogmap.experiments.cue_integration.run import (
     FIT_TRIALS,
     FITTED,
-    START,
     Budget,
     Session,
     fitted,
@@ -102,7 +101,7 @@ def cue_integration(
     if fit:
         with bar("fitting the noise") as progress:
             budget = Budget(FIT_TRIALS, common.seed, common.processes, progress, common.rules)
-            start = msgspec.structs.replace(START, range_only=range_only, unfelt=unfelt)
+            start = msgspec.structs.replace(FITTED, range_only=range_only, unfelt=unfelt)
             noise = fitted(start, budget)
 
     with bar("trials") as progress:
