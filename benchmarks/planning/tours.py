@@ -28,8 +28,6 @@ THRESHOLDS = {
 MIN_CITIES = 50
 MAX_CITIES = 80
 SEED = 1
-# Of each of the assumptions that are compared.
-CANDIDATE_PARTICIPANTS = 100
 
 
 class _Excess(NamedTuple):
@@ -98,9 +96,7 @@ def measure_human(folder: Path, processes: int) -> Metrics:
         planned = measure(jobs, processes, progress)
 
     with bar("planning by other assumptions") as progress:
-        compared = cross_validation.measure(
-            problems, CANDIDATE_PARTICIPANTS, SEED, processes, progress
-        )
+        compared = cross_validation.measure(problems, PARTICIPANTS, SEED, processes, progress)
 
     defaults = human_metrics(planned)
     defaults["within_iqr_share_of_defaults"] = defaults.pop("within_iqr_share_in_sample")

@@ -55,9 +55,9 @@ Examples:
     help="Landmarks show their distance and no direction, as in the paper's table 1, with its 3 %.",
 )
 @click.option(
-    "--unfelt",
+    "--felt",
     is_flag=True,
-    help="Disorientation takes away the steps after it too; otherwise only the pose.",
+    help="Disorientation takes away the pose alone; otherwise the steps after it too.",
 )
 @click.option(
     "--landmark-noise",
@@ -77,7 +77,7 @@ def cue_integration(
     trials: int,
     seeds: int,
     range_only: bool,
-    unfelt: bool,
+    felt: bool,
     landmark_noise: float | None,
     fit: bool,
 ) -> None:
@@ -96,12 +96,12 @@ def cue_integration(
     rules = results.show_rules(common)
     if landmark_noise is None:
         landmark_noise = DISTANCE if range_only else FITTED.landmark
-    noise = Noise(FITTED.speed, FITTED.turn, landmark_noise, range_only, unfelt)
+    noise = Noise(FITTED.speed, FITTED.turn, landmark_noise, range_only, felt)
 
     if fit:
         with bar("fitting the noise") as progress:
             budget = Budget(FIT_TRIALS, common.seed, common.processes, progress, common.rules)
-            start = msgspec.structs.replace(FITTED, range_only=range_only, unfelt=unfelt)
+            start = msgspec.structs.replace(FITTED, range_only=range_only, felt=felt)
             noise = fitted(start, budget)
 
     with bar("trials") as progress:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cogmap.experiments.cue_integration.geometry import CONFLICT_RAD, Points
-from cogmap.experiments.cue_integration.trial import Response, Trial
+from cogmap.experiments.cue_integration.geometry import CONFLICT_RAD, Point, Points
+from cogmap.experiments.cue_integration.trial import Trial
 from cogmap.geometry.arrays import Booleans
 from cogmap.geometry.se2 import rotate
 
@@ -20,7 +20,7 @@ LOST_SHARE = 0.01
 ROOM_M2 = 49.0
 
 
-def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
+def errors(trials: Sequence[Trial], placed: Sequence[Point]) -> Points:
     """Return where the post was put, relative to where it stood: (n, 2) metres, along and inward.
 
     Along is the direction in which turned landmarks move the target, whether or not they did,
@@ -28,8 +28,7 @@ def errors(trials: Sequence[Trial], responses: Sequence[Response]) -> Points:
     in either direction, then fall together.
     """
     targets_m = np.array([trial.target for trial in trials])
-    placed_m = np.array([response.position for response in responses])
-    offsets_m = placed_m - targets_m
+    offsets_m = np.array(placed) - targets_m
 
     turned_m = np.array([trial.turned_target for trial in trials])
     shifts_m = turned_m - targets_m

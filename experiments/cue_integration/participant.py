@@ -90,20 +90,29 @@ class Participant:
         is_within_reach = distance_m < REACH_M + NEAR_M
         if self._movements >= MAX_MOVEMENTS or (is_within_reach and not is_lost):
             self._has_stopped = True
-            return STOP, _movement(bearing_rad, distance_m)
+            return STOP, _movement(bearing_rad, distance_m, bearing_rad, distance_m)
 
         self._movements += 1
         if is_lost:
             self._looks += 1
-            return WALK, _movement(0.0, LOOK_M)
+            return WALK, _movement(0.0, LOOK_M, bearing_rad, distance_m)
 
         turn_rad, forward_m = step(bearing_rad, distance_m)
-        return WALK, _movement(turn_rad, forward_m)
+        return WALK, _movement(turn_rad, forward_m, bearing_rad, distance_m)
 
 
-def _movement(turn_rad: float, forward_m: float) -> dict[str, Scalar]:
-    """Return the parameters of a turn on the spot and a step straight on."""
-    return {"turn_rad": turn_rad, "forward_m": forward_m}
+def _movement(
+    turn_rad: float, forward_m: float, goal_bearing_rad: float, goal_distance_m: float
+) -> dict[str, Scalar]:
+    """Return the parameters of a turn on the spot and a step straight on, and where the goal is
+    believed to be before.
+    """
+    return {
+        "turn_rad": turn_rad,
+        "forward_m": forward_m,
+        "goal_bearing_rad": goal_bearing_rad,
+        "goal_distance_m": goal_distance_m,
+    }
 
 
 def build() -> Module:

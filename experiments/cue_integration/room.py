@@ -38,6 +38,7 @@ FOLLOW = "follow"
 WAIT = "wait"
 WALK = "walk"
 STOP = "stop"
+FIRST_LOOK = 2
 NOTHING: Mapping[str, Point] = {}
 AWAITS = {"workspace": 1, "codelets": 1, "participant": 1, transcript.NAME: 1}
 
@@ -56,6 +57,8 @@ class Room:
         self._frame = 0
         self._are_lit = True
         self._feels_steps = True
+        self._returned = 0
+        self._first_look: Point | None = None
         self.response: Response | None = None
 
     def begin(self) -> list[Message]:
@@ -81,10 +84,18 @@ class Room:
         else:
             turn_rad = float(action.parameters["turn_rad"])
             forward_m = float(action.parameters["forward_m"])
+            self._returned += 1
+
+        # The first of these actions was chosen with eyes closed.
+        if self._returned == FIRST_LOOK and self._first_look is None:
+            bearing_rad = float(action.parameters["goal_bearing_rad"])
+            distance_m = float(action.parameters["goal_distance_m"])
+            self._first_look = self._pose.after(bearing_rad, distance_m).position
 
         there = self._pose.after(turn_rad, forward_m)
         if action.scheme == STOP:
-            self.response = Response(there.x_m, there.y_m, self._frame)
+            first_look = self._first_look or there.position
+            self.response = Response(there.x_m, there.y_m, self._frame, first_look)
             return []
 
         self._pose = there
@@ -107,7 +118,7 @@ class Room:
         if condition is not Condition.LANDMARKS:
             return self._sensed(senses.STANDING, [])
 
-        self._feels_steps = not self._trial.noise.unfelt
+        self._feels_steps = self._trial.noise.felt
         heading_rad = float(self._rng.uniform(-math.pi, math.pi))
         self._pose = Pose(self._pose.x_m, self._pose.y_m, heading_rad)
         return self._sensed(senses.DISORIENTED, [])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
@@ -94,12 +94,14 @@ def respond(trial: Trial) -> Response:
 class Outcome:
     """Errors (n, 2) of every condition, along and inward, and the metrics of them.
 
-    SD and RMSE leave lost trials out, which are counted.
+    SD and RMSE leave lost trials out, which are counted. `first_look_m` are the errors if the post
+    had been put after one look, (n, 2) of every condition.
     """
 
     noise: Noise
     errors_m: dict[Condition, Points]
     shift_m: float
+    first_look_m: dict[Condition, Points] = field(default_factory=dict)
 
     def kept_m(self, condition: Condition) -> Points:
         """Return the errors (k, 2) of a condition's trials that are not lost."""
@@ -152,12 +154,16 @@ class Outcome:
         metrics["optimal_sd_m"] = self.optimal_sd_m
         metrics["sd_both_over_optimal"] = self.both_over_optimal
         metrics |= self.conflict_metrics()
+        if self.first_look_m:
+            once = Outcome(self.noise, self.first_look_m, self.shift_m)
+            metrics["sd_both_over_optimal_after_one_look"] = once.both_over_optimal
+
         return metrics | {
             "sigma_v": self.noise.speed,
             "sigma_w": self.noise.turn,
             "landmark_noise": self.noise.landmark,
             "range_only": float(self.noise.range_only),
-            "unfelt": float(self.noise.unfelt),
+            "felt": float(self.noise.felt),
             "trials_a_condition": float(len(self.errors_m[Condition.BOTH])),
         }
 
@@ -231,16 +237,19 @@ def measure_seeds(
 
     responses = parallel_map(respond, jobs, budget.processes, budget.progress)
     shift_m = analysis.shift_m(jobs)
-    errors_m = []
-    for first in range(0, len(jobs), budget.trials):
-        own = slice(first, first + budget.trials)
-        errors_m.append(analysis.errors(jobs[own], responses[own]))
+    placed = [response.position for response in responses]
+    first_looks = [response.first_look for response in responses]
 
     outcomes = []
-    for first in range(0, len(errors_m), len(conditions)):
-        of_seed = errors_m[first : first + len(conditions)]
-        by_condition = dict(zip(conditions, of_seed, strict=True))
-        outcomes.append(Outcome(noise, by_condition, shift_m))
+    for seed in range(seeds):
+        errors_m = {}
+        first_look_m = {}
+        for place, condition in enumerate(conditions, start=seed * len(conditions)):
+            own = slice(place * budget.trials, (place + 1) * budget.trials)
+            errors_m[condition] = analysis.errors(jobs[own], placed[own])
+            first_look_m[condition] = analysis.errors(jobs[own], first_looks[own])
+
+        outcomes.append(Outcome(noise, errors_m, shift_m, first_look_m))
 
     return outcomes
 
@@ -249,11 +258,13 @@ def pooled(outcomes: Sequence[Outcome]) -> Outcome:
     """Return the trials of all seeds as one outcome."""
     first = outcomes[0]
     errors_m = {}
+    first_look_m = {}
     for condition in first.errors_m:
-        of_seeds = [outcome.errors_m[condition] for outcome in outcomes]
-        errors_m[condition] = np.concatenate(of_seeds)
+        errors_m[condition] = np.concatenate([one.errors_m[condition] for one in outcomes])
+    for condition in first.first_look_m:
+        first_look_m[condition] = np.concatenate([one.first_look_m[condition] for one in outcomes])
 
-    return replace(first, errors_m=errors_m)
+    return replace(first, errors_m=errors_m, first_look_m=first_look_m)
 
 
 def metrics_of_seeds(outcomes: Sequence[Outcome], first_seed: int) -> Metrics:

@@ -30,15 +30,15 @@ class Noise(msgspec.Struct, frozen=True):
     to a landmark.
 
     Directions to landmarks err by as much across as distances do along; with `range_only` they are
-    not sensed (paper, table 1). With `unfelt`, disorientation takes away the steps that follow it,
-    too, not only the pose.
+    not sensed (paper, table 1). Disorientation takes away self-motion, the pose and the steps after
+    it; with `felt` the pose alone.
     """
 
     speed: float
     turn: float
     landmark: float = DISTANCE
     range_only: bool = False
-    unfelt: bool = False
+    felt: bool = False
 
 
 @dataclass(frozen=True)
@@ -83,11 +83,15 @@ class Trial:
 
 @dataclass(frozen=True)
 class Response:
-    """Where the participant put the first post back, in the room, after how many movements."""
+    """Where the participant put the first post back, in the room, after how many movements; and
+    where it believed that place to be after its first look on the way back, which is the first step
+    in the dark.
+    """
 
     x_m: float
     y_m: float
     movements: int
+    first_look: Point = (0.0, 0.0)
 
     @property
     def position(self) -> Point:

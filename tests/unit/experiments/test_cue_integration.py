@@ -192,12 +192,12 @@ def _trials(condition: Condition) -> list[Trial]:
     return [_trial(condition, number) for number in range(16)]
 
 
-def test_an_unfelt_step_after_disorientation_changes_only_that_condition() -> None:
-    unfelt = Noise(NOISY.speed, NOISY.turn, unfelt=True)
+def test_steps_felt_after_disorientation_change_only_that_condition() -> None:
+    felt = Noise(NOISY.speed, NOISY.turn, felt=True)
 
     for condition, is_changed in ((Condition.BOTH, False), (Condition.LANDMARKS, True)):
-        felt_m = _response(_trial(condition, 1))
-        unfelt_m = _response(_trial(condition, 1, unfelt))
+        felt_m = _response(_trial(condition, 1, felt))
+        unfelt_m = _response(_trial(condition, 1))
         assert (felt_m != unfelt_m) == is_changed
 
 
@@ -206,6 +206,13 @@ def test_trials_by_range_alone_end_with_a_response() -> None:
     put_m = _response(_trial(Condition.BOTH, 1, noise))
 
     assert math.dist(put_m, POSTS[8]) < 10.0
+
+
+def test_after_one_look_in_the_dark_the_place_is_known_roughly() -> None:
+    trial = _trial(Condition.BOTH, 3, STILL)
+    first_look = Session(trial).run().first_look
+
+    assert math.dist(first_look, trial.target) < 0.15
 
 
 def test_each_seed_gives_the_outcome_that_it_gives_alone() -> None:
@@ -230,12 +237,12 @@ def test_errors_lie_along_the_shift_of_the_target_by_turned_landmarks() -> None:
     trials = _trials(Condition.CONFLICT)
     assert {trial.side for trial in trials} == {1, -1}
 
-    at_turned = [Response(*trial.turned_target, 0) for trial in trials]
+    at_turned = [trial.turned_target for trial in trials]
     along_m, aside_m = analysis.errors(trials, at_turned).T
     assert along_m == pytest.approx(0.4569, abs=1e-4)
     assert aside_m == pytest.approx(0.0, abs=1e-4)
 
-    at_post_8 = [Response(*POSTS[8], 0)] * len(trials)
+    at_post_8 = [POSTS[8]] * len(trials)
     _, aside_m = analysis.errors(trials, at_post_8).T
     assert (aside_m > 1.7).all()
 
@@ -247,8 +254,8 @@ def test_errors_turn_with_the_landmarks() -> None:
     for trial in trials:
         x_m, y_m = trial.target[0] + 0.1, trial.target[1] - 0.3
         (turned_m,) = turned(((x_m, y_m),), trial.side * CONFLICT_RAD)
-        put.append(Response(x_m, y_m, 0))
-        moved.append(Response(*turned_m, 0))
+        put.append((x_m, y_m))
+        moved.append(turned_m)
 
     errors_m = analysis.errors(trials, put)
     expected_m = analysis.turned_errors(errors_m, analysis.shift_m(trials))
