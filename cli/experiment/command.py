@@ -7,6 +7,10 @@ import click
 from cogmap.cli.verbs import add_verbs
 
 VERBS = {
+    "ablation": (
+        "cogmap.cli.experiment.ablation:ablation",
+        "Our rules, each taken away in turn, beside the paper's.",
+    ),
     "city-maps": (
         "cogmap.cli.experiment.city_maps:city_maps",
         "Experiment 2, figure 8: maps learned of cities.",
