@@ -56,8 +56,8 @@ def ablation(common: Common, seeds: int, cities: Path | None, mrclam: Path | Non
 
     Laps of a town whose goals the agent plans its way to, maps of cities, and the path of figure 6,
     all at the level of percepts: nothing is rendered. Beside each stands path integration alone, of
-    fused self-motion and of wheels. A run that is lost, or ends early, is counted. Takes some
-    twelve minutes on two cores; with --mrclam several times as long.
+    fused self-motion and of wheels. A run that is lost, or ends early, is counted. Takes some ten
+    minutes on two cores; with --mrclam several times as long.
     """
     folder = results.folder_for(NAME, common.out)
     chosen = range(common.seed, common.seed + seeds)
@@ -69,7 +69,7 @@ def ablation(common: Common, seeds: int, cities: Path | None, mrclam: Path | Non
 
     metrics = ablation_metrics(domains, measured)
     metrics["seeds"] = float(seeds)
-    Console().print(_table(domains, metrics))
+    Console().print(table(domains, metrics))
 
     from cogmap.cli.plots.ablation import figure  # matplotlib takes long to import
 
@@ -91,25 +91,25 @@ def _domains(seeds: Sequence[int], cities: Path | None, mrclam: Path | None) -> 
     return [domain for domain in domains if domain.cases]
 
 
-def _table(domains: Sequence[Domain], metrics: Metrics) -> Table:
+def table(domains: Sequence[Domain], metrics: Metrics) -> Table:
     """Return mean and SD of the errors, in parentheses the mean over fused self-motion's, and how
     many runs were lost.
     """
     headings = [f"{domain.label}, {domain.unit}" for domain in domains]
-    table = Table("rules", *headings, title="errors, mean ± SD (over fused self-motion alone)")
+    rows = Table("rules", *headings, title="errors, mean ± SD (over fused self-motion alone)")
 
     for variant, label in LABELS.items():
         cells = [_cell(f"{domain.name}_{variant}", domain.unit, metrics) for domain in domains]
-        table.add_row(label, *cells)
+        rows.add_row(label, *cells)
 
-    table.add_section()
+    rows.add_section()
     for alone in ("fused", "wheels"):
         cells = []
         for domain in domains:
             cells.append(_spread(f"{domain.name}_{OURS}_{alone}_error_{domain.unit}", metrics))
-        table.add_row(f"{alone} alone, on our drives", *cells)
+        rows.add_row(f"{alone} alone, on our drives", *cells)
 
-    return table
+    return rows
 
 
 def _cell(name: str, unit: str, metrics: Metrics) -> str:

@@ -23,6 +23,7 @@ from cogmap.experiments.ablation.variants import (
     Rules,
     with_variant,
 )
+from cogmap.runtime.config import Sections
 from cogmap.services.codelets import rules as presets
 from cogmap.services.codelets.rules import PRESETS, RULES, rules_of
 from tests.support.recordings import mrclam_folder
@@ -64,7 +65,10 @@ def test_each_rule_of_the_paper_takes_one_addition_away() -> None:
 
 
 def test_a_variant_changes_no_other_rule_or_setting() -> None:
-    sections = {"codelets": {"correct": "heading", "samples": 500}, "sim": {"seed": 3}}
+    sections: Sections = {
+        "codelets": {"correct": "heading", "samples": 500},
+        "sim": {"seed": 3},
+    }
 
     changed = with_variant(sections, {"correct": "eq9"})
 
