@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from statistics import fmean, stdev
+from statistics import fmean, median, stdev
 
 import numpy as np
 
@@ -16,7 +16,7 @@ Metrics = dict[str, float | str | None]
 
 
 def ablation_metrics(domains: Sequence[Domain], measured: Measured) -> Metrics:
-    """Return mean and SD of every cell, the runs that were lost, and ratios.
+    """Return mean, SD and median of every cell, the runs that were lost, and ratios.
 
     `..._over_fused` is of the same run's fused self-motion alone, `..._over_ours_...` of the run of
     the same case by our rules. A cell is filled if each of its runs has a number or is counted as
@@ -65,11 +65,12 @@ def over(outcomes: Sequence[Outcome], others: Sequence[Outcome]) -> list[float]:
 
 
 def spread(name: str, values: Sequence[float]) -> Metrics:
-    """Return `name`_mean and `name`_sd of the values that are numbers: None of none, and the SD of
-    one.
+    """Return `name`_mean, `name`_sd and `name`_median of the values that are numbers: None of none,
+    and the SD of one.
     """
     known = [value for value in values if np.isfinite(value)]
     return {
         f"{name}_mean": fmean(known) if known else None,
         f"{name}_sd": stdev(known) if len(known) > 1 else None,
+        f"{name}_median": median(known) if known else None,
     }

@@ -150,7 +150,8 @@ def test_a_cell_without_any_number_has_none_in_json() -> None:
 
 
 def test_errors_are_compared_case_by_case() -> None:
-    domains = [Domain("town", "town", "m", [Reckoned(1.0), Reckoned(4.0)], plans=True)]
+    cases = [Reckoned(1.0), Reckoned(4.0)]
+    domains = [Domain("town", "town", "m", cases, plans=True)]
 
     metrics = ablation_metrics(domains, measure(domains, 1, _quiet))
 
@@ -159,6 +160,16 @@ def test_errors_are_compared_case_by_case() -> None:
     assert metrics["town_ours_wheels_error_m_mean"] == 4
     assert metrics["paper_over_ours_town_mean"] == pytest.approx((5 / 1 + 8 / 4) / 2)
     assert metrics["paper_over_ours_town_sd"] == pytest.approx(1.5 * 2**0.5)
+
+
+def test_one_case_far_out_does_not_move_the_median() -> None:
+    cases = [Reckoned(1.0), Reckoned(2.0), Reckoned(900.0)]
+    domains = [Domain("town", "town", "m", cases, plans=True)]
+
+    metrics = ablation_metrics(domains, measure(domains, 1, _quiet))
+
+    assert metrics["town_ours_error_m_median"] == 2
+    assert metrics["town_ours_error_m_mean"] == 301
 
 
 def test_planning_counts_only_where_the_agent_plans_its_way() -> None:
