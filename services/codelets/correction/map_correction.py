@@ -7,6 +7,7 @@ Correction node for the apply-correction codelet.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import msgspec
@@ -15,7 +16,8 @@ from scipy.special import chdtri
 
 from cogmap.estimation import printed_rule
 from cogmap.estimation.alignment import motion_onto
-from cogmap.estimation.gnc import inliers
+from cogmap.estimation.gnc import RELIABLE_SHARE, inliers
+from cogmap.estimation.hypotheses import Hypotheses
 from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pairwise_consistency import (
     MAX_VIEW_SD_M,
@@ -35,6 +37,7 @@ from cogmap.estimation.reverse_replay import close_loops, with_positions_only
 from cogmap.geometry.arrays import Booleans, Floats
 from cogmap.geometry.se2 import (
     cumulative,
+    integrate,
     rotate,
     rotation_matrices,
     transform_from,
@@ -250,14 +253,50 @@ def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config)
         closures=NO_CONSTRAINTS,
         joins=joins_of(path, rows[:, STAMP]),
     )
-    # A landmark's constraint depends on the agent's heading: it is computed again if the
-    # optimization changes that.
     chosen = views.select(is_consistent)
+    loops = _loops(start, chosen, believes_all)
+    if len(loops.holds) and loops.holds.mean() < RELIABLE_SHARE:
+        # A loop that was closed by landmarks alone may have turned the path too far for views of
+        # places to turn it back: it is judged by self-motion alone, too.
+        poses = integrate(rows[0, POSE], steps.measurement)
+        poses[:, 2] = wrap_angle(poses[:, 2])
+        alone = replace(start, poses=poses)
+        loops = min(
+            loops, _loops(alone, chosen, believes_all), key=lambda each: each.truncated_cost
+        )
+
+    agrees = np.ones(len(closures), bool)
+    agrees[is_view] = is_consistent
+    is_accepted = agrees.copy()
+    is_accepted[is_view & agrees] = loops.holds
+    return Judgement(agrees, is_accepted, loops.path, chosen.select(loops.holds))
+
+
+class _Loops(NamedTuple):
+    """Which closures of `judged` hold, (m,), and the path with those."""
+
+    judged: PoseGraph
+    holds: Booleans
+    path: PoseGraph
+
+    @property
+    def truncated_cost(self) -> float:
+        """Return the cost of holding these alone."""
+        return Hypotheses(self.judged, FALSE_CLOSURE).truncated_cost(self.holds)
+
+
+def _loops(start: PoseGraph, chosen: Views, believes_all: bool) -> _Loops:
+    """Judge consistent closures from where the path is at the `start`, or believe all of them.
+
+    A landmark's constraint depends on the agent's heading: it is computed again if the optimization
+    changes that.
+    """
     loops = constraints_of(chosen, start.poses)
     for _ in range(MAX_ROUNDS):
+        judged = start.with_closures(loops)
         holds = np.ones(len(loops), bool)
         if not believes_all:
-            holds = inliers(start.with_closures(loops), FALSE_CLOSURE)
+            holds = inliers(judged, FALSE_CLOSURE)
         graph = start.with_closures(loops.select(holds))
         again = constraints_of(chosen, optimize(graph))
 
@@ -266,11 +305,7 @@ def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config)
             break
         loops = again
 
-    agrees = np.ones(len(closures), bool)
-    agrees[is_view] = is_consistent
-    is_accepted = agrees.copy()
-    is_accepted[is_view & agrees] = holds
-    return Judgement(agrees, is_accepted, graph, chosen.select(holds))
+    return _Loops(judged, holds, graph)
 
 
 def _start(poses: Floats, steps: Constraints) -> Floats:
