@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -11,9 +12,10 @@ from cogmap.cli.experiment.options import Common, common_options
 from cogmap.cli.options import FiniteRange
 from cogmap.cli.progress import bar
 from cogmap.errors import UsageError
+from cogmap.experiments.city_maps import people
 from cogmap.experiments.city_maps.drive import MODULES
-from cogmap.experiments.city_maps.environment import Environment, environments
-from cogmap.experiments.city_maps.fit import fitted
+from cogmap.experiments.city_maps.environment import City, Environment, environments
+from cogmap.experiments.city_maps.fit import Fit, fitted, halves
 from cogmap.experiments.city_maps.measure import (
     MAPS,
     NOISE,
@@ -25,8 +27,9 @@ from cogmap.experiments.city_maps.measure import (
     jobs,
     measure,
 )
-from cogmap.experiments.city_maps.metrics import camera_metrics, map_metrics
+from cogmap.experiments.city_maps.metrics import camera_metrics, fit_metrics, map_metrics
 from cogmap.experiments.city_maps.sources import folder, from_osm, grown_environments
+from cogmap.parallel import Progress
 from cogmap.services.sim.odometry import Noise
 
 NAME = "city-maps"
@@ -34,8 +37,10 @@ _EPILOG = """\b
 Examples:
   cogmap experiment city-maps --json city.json        cities grown from a seed
   cogmap experiment city-maps --osm monaco.osm.xz --maps 4
-  cogmap experiment city-maps --all extracts          every extract in a folder
+  cogmap experiment city-maps --all extracts          every extract in a folder, against people
+  cogmap experiment city-maps --maps 4 --human examples/human_maps.csv
 """
+TRAVERSALS_OF_ALL = 2
 
 
 @click.command(name=NAME, epilog=_EPILOG)
@@ -62,23 +67,28 @@ Examples:
 @click.option(
     "--traversals",
     type=click.IntRange(1, 1000),
-    default=TRAVERSALS,
-    show_default=True,
-    help="Traversals of each map.",
+    help=f"Traversals of each map.  [default: {TRAVERSALS}, with --all {TRAVERSALS_OF_ALL}]",
 )
 @click.option(
     "--noise",
     nargs=3,
     type=FiniteRange(0, 1),
-    default=(NOISE.speed, NOISE.turn, NOISE.drift_rad_per_sqrt_m),
-    show_default=True,
     metavar="SPEED TURN DRIFT",
-    help="Noise of self-motion: shares of speed and of turn, and drift in radians after a metre.",
+    help="Noise of self-motion: shares of speed and of turn, and drift in radians after a metre.  "
+    f"[default: {NOISE.speed} {NOISE.turn} {NOISE.drift_rad_per_sqrt_m}, fitted with --all]",
 )
 @click.option(
     "--fit",
     is_flag=True,
-    help="Fit that noise to the errors of people first; takes many times as long.",
+    help="Fit that noise to the errors of people on every second map, by the paper's rule, and "
+    "measure the others. --all does so unless --noise is given.",
+)
+@click.option(
+    "--human",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Compare with maps that people drew: a CSV file of map, person, building, x and y, as "
+    "buildings.csv among the results has them.",
 )
 @common_options
 def city_maps(
@@ -86,9 +96,10 @@ def city_maps(
     osm: Path | None,
     all_in: Path | None,
     maps: int | None,
-    traversals: int,
-    noise: tuple[float, float, float],
+    traversals: int | None,
+    noise: tuple[float, float, float] | None,
     fit: bool,
+    human: Path | None,
 ) -> None:
     """Run experiment 2, figure 8: an agent learns maps of cities, with their loops closed and not.
 
@@ -96,22 +107,38 @@ def city_maps(
     tour past them along the streets, from any of the buildings. Percepts are not rendered: they
     have the measured errors of perception.
     """
+    if fit and noise is not None:
+        raise UsageError("--fit and --noise: give one of them")
     out = results.folder_for(NAME, common.out)
     rules = results.show_rules(common)
-    with bar("choosing buildings"):
-        places = _places(osm, all_in, maps, common.seed)
-    chosen = Noise(speed=noise[0], turn=noise[1], drift_rad_per_sqrt_m=noise[2])
+    with bar("choosing buildings") as progress:
+        places = _places(osm, all_in, maps, common.seed, progress)
+    (out / "buildings.csv").write_text(people.template(places))
+    people_km2 = people.read(human, places) if human is not None else None
 
-    if fit:
+    chosen = NOISE
+    if noise is not None:
+        chosen = Noise(speed=noise[0], turn=noise[1], drift_rad_per_sqrt_m=noise[2])
+    fits: dict[str, Fit] = {}
+    fitted_maps = 0
+    if fit or (all_in is not None and noise is None and len(places) > 1):
+        to, places = halves(places)
+        fitted_maps = len(to)
         with bar("fitting the noise") as progress:
-            budget = Budget(traversals, common.seed, common.processes, progress, common.rules)
-            chosen = fitted(places, budget)
+            fits = fitted(to, places, common.seed, progress)
+        chosen = fits["view"].noise
 
+    often = traversals or (TRAVERSALS if all_in is None else TRAVERSALS_OF_ALL)
     with bar("traversals") as progress:
-        budget = Budget(traversals, common.seed, common.processes, progress, common.rules)
+        budget = Budget(often, common.seed, common.processes, progress, common.rules)
         found = measure(places, chosen, budget)
 
     metrics = map_metrics(found, chosen) | rules
+    if fits:
+        metrics |= fit_metrics(found, fits, fitted_maps)
+    if people_km2 is not None:
+        metrics |= people.metrics(found, people_km2)
+
     first = jobs(places, chosen, 1, common.seed, common.rules)[0]
     if common.cameras:
         with bar("with cameras") as progress:
@@ -134,7 +161,7 @@ def _save(out: Path, found: list[CityMap], metrics: dict[str, float | str], comm
 
 
 def _places(
-    osm: Path | None, all_in: Path | None, maps: int | None, seed: int
+    osm: Path | None, all_in: Path | None, maps: int | None, seed: int, progress: Progress
 ) -> list[Environment]:
     if osm is not None and all_in is not None:
         raise UsageError("--osm and --all: give one of them")
@@ -143,9 +170,26 @@ def _places(
         return environments(from_osm(osm), maps or MAPS, seed)
 
     if all_in is not None:
-        found = []
-        for city in folder(all_in, seed):
-            found += environments(city, maps or 1, seed)
-        return found
+        return _places_of_all(folder(all_in, seed), maps or 1, seed, progress)
 
     return grown_environments(maps or MAPS, seed)
+
+
+def _places_of_all(
+    cities: Sequence[City], maps: int, seed: int, progress: Progress
+) -> list[Environment]:
+    """Choose buildings in each city, and name those that have too few. Raises UsageError if all
+    have.
+    """
+    found = []
+
+    for number, city in enumerate(cities, start=1):
+        try:
+            found += environments(city, maps, seed)
+        except UsageError as error:
+            click.echo(f"left out: {error}", err=True)
+        progress(number / len(cities))
+
+    if not found:
+        raise UsageError("no city of the folder has enough buildings: give larger extracts")
+    return found

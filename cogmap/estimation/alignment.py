@@ -1,4 +1,4 @@
-"""Rigid alignment: the motion that brings points onto others."""
+"""Alignment: the motion that brings points onto others, and their likeness to them."""
 
 from __future__ import annotations
 
@@ -30,3 +30,19 @@ def motion_onto(
     turn_rad = np.arctan2(across, along)
     shift_m = other_middle_m - rotate(middle_m, turn_rad)
     return np.array([*shift_m, turn_rad])
+
+
+def similar_to(points_m: Floats, others_m: Floats) -> Floats:
+    """Turn, move and scale (k, 2) points onto others with the least squares (Procrustes), without
+    mirroring them. Return them. Points that are all at one place come to the others' middle.
+    """
+    middle_m = points_m.mean(axis=0)
+    other_middle_m = others_m.mean(axis=0)
+    points = (points_m - middle_m) @ (1, 1j)
+    others = (others_m - other_middle_m) @ (1, 1j)
+
+    # As complex numbers, a turn with a scale is a factor.
+    extent = np.vdot(points, points).real
+    factor = np.vdot(points, others) / extent if extent > 0 else 0.0
+    found = factor * points
+    return np.asarray(other_middle_m + np.column_stack([found.real, found.imag]))

@@ -5,8 +5,10 @@ from __future__ import annotations
 from cogmap.runtime.config import Sections
 from cogmap.services.codelets.rules import OURS, positions_rule, with_rules
 
+POSITIONS = "positions"
+HEADING = "heading"
 # No loop is closed; positions only, as in the paper; headings too.
-METHODS = ("none", "positions", "heading")
+METHODS = ("none", POSITIONS, HEADING)
 NEVER_S = 1e9
 PLACE_SD_M = 2.5
 PLACE_SD_RAD = 0.05
@@ -29,6 +31,6 @@ def settings(method: str, step_m: float, rules: str = OURS) -> Sections:
     if method == "none":
         codelets["revisit_s"] = NEVER_S
     else:
-        codelets["correct"] = positions_rule(rules) if method == "positions" else method
+        codelets["correct"] = positions_rule(rules) if method == POSITIONS else method
 
     return with_rules({"codelets": codelets}, rules)

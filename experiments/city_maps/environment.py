@@ -53,9 +53,14 @@ class Environment:
         return float(width_m * height_m) / 1e6
 
     @property
+    def leg_lengths_m(self) -> Points:
+        """Return the length of each of the `legs_m`, (8,)."""
+        return np.array([_step_lengths_m(leg).sum() for leg in self.legs_m])
+
+    @property
     def tour_m(self) -> float:
         """Return the length of the tour."""
-        return float(sum(_step_lengths_m(leg).sum() for leg in self.legs_m))
+        return float(self.leg_lengths_m.sum())
 
     def line(self, start: int, backward: bool, lead_m: float, overrun_m: float) -> Points:
         """Return the tour past building `start`, all others and `start` again.

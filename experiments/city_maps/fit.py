@@ -4,59 +4,98 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from functools import cache
+from dataclasses import dataclass
 
-import numpy as np
+from scipy.optimize import brentq
 
+from cogmap.errors import UsageError
 from cogmap.experiments.city_maps import published
-from cogmap.experiments.city_maps.drive import traverse
 from cogmap.experiments.city_maps.environment import Environment
-from cogmap.experiments.city_maps.measure import (
-    NOISE,
-    Budget,
-    Job,
-    configurations,
-    jobs,
-    map_error_km2,
-)
-from cogmap.experiments.cue_integration.fit import coordinate_descent
-from cogmap.parallel import parallel_map
+from cogmap.experiments.city_maps.measure import NOISE
+from cogmap.experiments.city_maps.rule import VIEW_M, WHOLE_M, mean_error_km2, rule_tours
+from cogmap.parallel import Progress
 from cogmap.services.sim.odometry import Noise
 
-FIT_TRAVERSALS = 2
-FACTORS = (1.4, 1.15)
-MAX_NOISE = 1.0
+TOURS = 4
+LAPS = 25
+# Shares of speed and turn between which those are sought that err as people do.
+NOISE_RANGE = (0.01, 1.0)
+TOLERANCE = 0.01
+"""A share of the noise: people's mean is known far less well."""
+
+TYPICAL_TRIALS = 8
 OTHERS = 500_000
 
 
-def fitted(environments: Sequence[Environment], budget: Budget) -> Noise:
-    """Fit speed and turn noise, by coordinate descent, so that maps whose positions alone are
-    corrected err as people's do.
-
-    There is one mean for two noises: others would fit as well. The traversals are others than those
-    measured with the same seed.
+@dataclass(frozen=True)
+class Fit:
+    """Noise that was fitted, and how much the paper's rule errs with it on maps that it was fitted
+    to, and on maps that it was not, in km^2.
     """
-    traversals = min(budget.traversals, FIT_TRAVERSALS)
-    seed = budget.seed + OTHERS
 
-    @cache
-    def cost(noise: Noise) -> float:
-        if max(noise.speed, noise.turn) > MAX_NOISE:
-            return float("inf")
-
-        tried = jobs(environments, noise, traversals, seed, budget.rules)
-        errors_km2 = parallel_map(positions_error_km2, tried, budget.processes, budget.progress)
-
-        mean_km2 = float(np.mean(errors_km2))
-        return (mean_km2 - published.HUMAN_MEAN_KM2) ** 2
-
-    return coordinate_descent(cost, NOISE, FACTORS)
+    noise: Noise
+    fitted_km2: float
+    tested_km2: float
 
 
-def positions_error_km2(job: Job) -> float:
-    """Return the error of the map of one traversal, positions corrected."""
-    configured = configurations(job)["positions"]
-    learned_m = traverse(configured).buildings_m
-    true_m = job.environment.buildings_m
-    return map_error_km2(learned_m, true_m)
+def halves(environments: Sequence[Environment]) -> tuple[list[Environment], list[Environment]]:
+    """Split environments by their names' order: the first, third and so on to be fitted to, the
+    others to be tested on. Raises UsageError if there is only one.
+    """
+    if len(environments) < 2:
+        raise UsageError("a fit takes two maps or more, to test on one of them: give more --maps")
+
+    ordered = sorted(environments, key=lambda each: each.name)
+    return ordered[::2], ordered[1::2]
+
+
+def fitted(
+    to: Sequence[Environment], others: Sequence[Environment], seed: int, progress: Progress
+) -> dict[str, Fit]:
+    """Fit the noise by which the paper's rule errs on the maps `to` as people do: if factors are
+    drawn anew each `view`, and if they are alike for all views of a `leg`.
+
+    One mean cannot tell two noises apart: speed and turn have the same share. The tours are others
+    than those measured with the same seed. Raises UsageError if the maps are too small, or too
+    large, for any noise.
+    """
+    by_view = _fitted(to, others, VIEW_M, seed + OTHERS, lambda share: progress(share / 2))
+    by_leg = _fitted(to, others, WHOLE_M, seed + OTHERS, lambda share: progress((1 + share) / 2))
+    return {"view": by_view, "leg": by_leg}
+
+
+def _fitted(
+    to: Sequence[Environment],
+    others: Sequence[Environment],
+    step_m: float,
+    seed: int,
+    progress: Progress,
+) -> Fit:
+    tours = rule_tours(to, step_m, TOURS, seed)
+    tried = 0
+
+    def excess_km2(log_share: float) -> float:
+        nonlocal tried
+        tried += 1
+        progress(tried / (tried + TYPICAL_TRIALS))
+        error_km2 = mean_error_km2(tours, _noise(log_share), LAPS, seed)
+        return error_km2 - published.HUMAN_MEAN_KM2
+
+    low, high = map(math.log, NOISE_RANGE)
+    if excess_km2(low) > 0 or excess_km2(high) < 0:
+        raise UsageError(
+            f"no noise from {NOISE_RANGE[0]} to {NOISE_RANGE[1]} makes maps err by "
+            f"{published.HUMAN_MEAN_KM2} km²: give larger or other cities, or --noise"
+        )
+
+    noise = _noise(float(brentq(excess_km2, low, high, xtol=TOLERANCE)))
+    fitted_km2 = mean_error_km2(tours, noise, LAPS, seed)
+    tested = rule_tours(others, step_m, TOURS, seed)
+    return Fit(noise, fitted_km2, mean_error_km2(tested, noise, LAPS, seed))
+
+
+def _noise(log_share: float) -> Noise:
+    share = math.exp(log_share)
+    return Noise(speed=share, turn=share, drift_rad_per_sqrt_m=NOISE.drift_rad_per_sqrt_m)

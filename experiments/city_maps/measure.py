@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from cogmap.estimation.alignment import similar_to
 from cogmap.experiments import rendered
 from cogmap.experiments.city_maps.correction import METHODS
 from cogmap.experiments.city_maps.drive import COGNITION, Tour, driven, sections, traverse
@@ -73,6 +74,14 @@ class CityMap:
     def error_km2(self, method: str) -> float:
         """Return the mean error over the traversals."""
         errors_km2 = [one.error_km2[method] for one in self.learned]
+        return float(np.mean(errors_km2))
+
+    def aligned_error_km2(self, method: str) -> float:
+        """Return the mean error over the traversals if maps are turned, moved and scaled first, as
+        people's were.
+        """
+        true_m = self.environment.buildings_m
+        errors_km2 = [aligned_error_km2(one.buildings_m[method], true_m) for one in self.learned]
         return float(np.mean(errors_km2))
 
     @property
@@ -168,6 +177,17 @@ def map_error_km2(learned_m: Points, true_m: Points) -> float:
 
     mean_m2 = float(squared_m2[is_known].mean())
     return mean_m2 * len(squared_m2) / 1e6
+
+
+def aligned_error_km2(learned_m: Points, true_m: Points) -> float:
+    """Return the same of a map that is turned, moved and scaled to fit first (Procrustes)."""
+    is_known = ~np.isnan(learned_m[:, 0])
+    if not is_known.any():
+        return float("nan")
+
+    aligned_m = np.full_like(true_m, np.nan)
+    aligned_m[is_known] = similar_to(learned_m[is_known], true_m[is_known])
+    return map_error_km2(aligned_m, true_m)
 
 
 def _learned(job: Job, maps: Mapping[str, Traversal]) -> Learned:

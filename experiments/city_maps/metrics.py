@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from cogmap.experiments.city_maps import published
+from cogmap.experiments.city_maps.correction import HEADING, METHODS, POSITIONS
 from cogmap.experiments.city_maps.drive import SENSING
+from cogmap.experiments.city_maps.fit import Fit
 from cogmap.experiments.city_maps.measure import CityMap, Learned
 from cogmap.experiments.city_maps.observer import FUSED, WHEELS
 from cogmap.services.sim.odometry import Noise
@@ -51,6 +53,10 @@ def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
         metrics[f"error_{name}_sd_km2"] = float(values_km2.std())
         metrics[f"growth_{name}_km2_per_km"] = growth(maps, values_km2)
 
+    for method in METHODS:
+        aligned_km2 = np.mean([city.aligned_error_km2(method) for city in maps])
+        metrics[f"error_{NAMES[method]}_aligned_km2"] = float(aligned_km2)
+
     metrics |= {
         "maps": float(len(maps)),
         "traversals": float(len(maps[0].learned)),
@@ -73,6 +79,51 @@ def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
         metrics[f"{prefix}_tour_km"] = city.environment.tour_m / 1e3
         for method, name in NAMES.items():
             metrics[f"{prefix}_error_{name}_km2"] = city.error_km2(method)
+        for method in METHODS:
+            key = f"{prefix}_error_{NAMES[method]}_aligned_km2"
+            metrics[key] = city.aligned_error_km2(method)
+
+    return metrics
+
+
+def fit_metrics(maps: Sequence[CityMap], fits: Mapping[str, Fit], fitted_maps: int) -> Metrics:
+    """Return how the errors of the `maps` that the noise was not fitted to compare with people's:
+    ratios of mean errors.
+
+    `paper` is of agents whose positions alone are corrected, `ours` of those whose headings are
+    too. `rule` is of the paper's rule without any percept, by which the noise was fitted: drawn
+    anew each `view`, as the agents have it, or alike for all views of a `leg`.
+    """
+    paper_km2, ours_km2, paper_aligned_km2, ours_aligned_km2 = np.mean(
+        [
+            (
+                city.error_km2(POSITIONS),
+                city.error_km2(HEADING),
+                city.aligned_error_km2(POSITIONS),
+                city.aligned_error_km2(HEADING),
+            )
+            for city in maps
+        ],
+        axis=0,
+    ).tolist()
+    people_km2 = published.HUMAN_MEAN_KM2
+    metrics: Metrics = {
+        "paper_over_people": paper_km2 / people_km2,
+        "ours_over_paper": ours_km2 / paper_km2,
+        "paper_aligned_over_people": paper_aligned_km2 / people_km2,
+        "ours_aligned_over_paper_aligned": ours_aligned_km2 / paper_aligned_km2,
+        "split": "by name: the first, third and so on fitted to, the others tested",
+        "maps_fitted": float(fitted_maps),
+        "maps_tested": float(len(maps)),
+    }
+
+    for drawn, fit in fits.items():
+        metrics |= {
+            f"noise_speed_by_{drawn}": fit.noise.speed,
+            f"noise_turn_by_{drawn}": fit.noise.turn,
+            f"rule_by_{drawn}_fitted_over_people": fit.fitted_km2 / people_km2,
+            f"rule_by_{drawn}_over_people": fit.tested_km2 / people_km2,
+        }
 
     return metrics
 

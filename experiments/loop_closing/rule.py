@@ -41,33 +41,61 @@ class Laps:
         return float(is_nearer.mean())
 
 
+@dataclass(frozen=True, eq=False)
+class Steps:
+    """A line in n steps, each straight on and then a turn on the spot, (n,) each; it sets out at
+    `heading_rad`.
+    """
+
+    distance_m: Floats
+    turn_rad: Floats
+    heading_rad: float
+
+    @classmethod
+    def along(cls, line: Line, step_m: float) -> Steps:
+        """Cut `line` every `step_m` and at its points."""
+        stops_m = np.arange(0.0, line.length_m, step_m).tolist()
+        legs = []
+        for start_m, end_m in itertools.pairwise([*stops_m, line.length_m]):
+            legs += line.legs(start_m, end_m)
+
+        distance_m, turn_rad = np.array(legs).T
+        return cls(distance_m, turn_rad, float(line.heading_rad[0]))
+
+    @property
+    def along_m(self) -> Floats:
+        """Return how far along the line each step ends, (n,)."""
+        return np.asarray(np.cumsum(self.distance_m))
+
+    def errors_m(self, noise: Noise, laps: int, rng: np.random.Generator) -> Floats:
+        """Return the errors of positions by path integration alone after each step, (laps, n, 2),
+        the noise drawn anew for each step.
+        """
+        heading_rad = self.heading_rad + _sum_before(self.turn_rad)
+        true_m = _displacements_m(self.distance_m, heading_rad)
+
+        distance_m, error_rad = _measured(self.distance_m, self.turn_rad, noise, laps, rng)
+        measured_m = _displacements_m(distance_m, heading_rad + error_rad)
+        return np.asarray(np.cumsum(measured_m - true_m, axis=1))
+
+    def closed_m(self, error_m: Floats) -> Floats:
+        """Return (laps, n, 2) errors as eq. 9 leaves them where the line ends at its start: the
+        error of the end is taken from each position by the share of the loop before it.
+        """
+        along_m = self.along_m
+        share = along_m / along_m[-1]
+        return np.asarray(error_m - share[:, None] * error_m[:, -1:])
+
+
 def close_laps(
     corners_m: Sequence[tuple[float, float]], step_m: float, noise: Noise, laps: int, seed: int
 ) -> Laps:
     """Measure `laps` times once round `corners_m`, which end where they begin, in steps of
     `step_m`, with `noise` each.
     """
-    line = Line(np.array(corners_m, float))
-    stops_m = np.arange(0.0, line.length_m, step_m).tolist()
-    legs = []
-    for start_m, end_m in itertools.pairwise([*stops_m, line.length_m]):
-        legs += line.legs(start_m, end_m)
-    # Of each leg: straight on, and then a turn on the spot.
-    distance_m, turn_rad = np.array(legs).T
-    heading_rad = float(line.heading_rad[0]) + _sum_before(turn_rad)
-    true_m = _displacements_m(distance_m, heading_rad)
-
-    rng = np.random.default_rng(seed)
-    measured_distance_m, heading_error_rad = _measured(distance_m, turn_rad, noise, laps, rng)
-    measured_heading_rad = heading_rad + heading_error_rad
-    measured_m = _displacements_m(measured_distance_m, measured_heading_rad)
-
-    # Eq. 9: the error of the end is taken from each position by the share of the loop before it.
-    error_m = np.cumsum(measured_m - true_m, axis=1)
-    along_m = np.cumsum(distance_m)
-    share = along_m / along_m[-1]
-    closed_m = error_m - share[:, None] * error_m[:, -1:]
-    return Laps(_rms_m(error_m), _rms_m(closed_m))
+    steps = Steps.along(Line(np.array(corners_m, float)), step_m)
+    error_m = steps.errors_m(noise, laps, np.random.default_rng(seed))
+    return Laps(_rms_m(error_m), _rms_m(steps.closed_m(error_m)))
 
 
 def _measured(

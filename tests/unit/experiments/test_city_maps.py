@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,15 @@ from cogmap.experiments.city_maps.environment import (
     Environment,
     environments,
 )
-from cogmap.experiments.city_maps.measure import NOISE, CityMap, Learned, map_error_km2
-from cogmap.experiments.city_maps.metrics import map_metrics
+from cogmap.experiments.city_maps.fit import Fit, fitted, halves
+from cogmap.experiments.city_maps.measure import (
+    NOISE,
+    CityMap,
+    Learned,
+    aligned_error_km2,
+    map_error_km2,
+)
+from cogmap.experiments.city_maps.metrics import fit_metrics, map_metrics
 from cogmap.experiments.city_maps.observer import WHEELS
 from cogmap.experiments.city_maps.sources import from_osm, grown, plane_m
 from cogmap.experiments.city_maps.streets import Streets, shortest_path
@@ -170,10 +178,22 @@ def test_the_error_is_the_sum_of_squares_in_square_kilometres() -> None:
     assert map_error_km2(half_missing, true) == pytest.approx(8 * 0.25)
 
 
+def test_a_map_that_is_turned_moved_and_scaled_alone_has_no_aligned_error() -> None:
+    true_m = _environment(1).buildings_m
+    quarter_turn = np.array([(0.0, -1.0), (1.0, 0.0)])
+    learned_m = 0.3 * true_m @ quarter_turn + (900.0, -70.0)
+    assert map_error_km2(learned_m, true_m) > 1
+    assert aligned_error_km2(learned_m, true_m) == pytest.approx(0, abs=1e-9)
+
+    mirrored_m = true_m * (1, -1)
+    assert aligned_error_km2(mirrored_m, true_m) > 0.01
+
+
 def _map(environment: Environment, errors_km2: dict[str, float]) -> CityMap:
     """A map learned in one traverse, of which only the errors count."""
     nothing = dict.fromkeys(errors_km2, np.zeros((0, 2)))
-    learned = Learned(errors_km2, 0, nothing, nothing, nothing)
+    right = dict.fromkeys(errors_km2, environment.buildings_m)
+    learned = Learned(errors_km2, 0, right, nothing, nothing)
     return CityMap(environment, (learned,))
 
 
@@ -189,6 +209,52 @@ def test_the_ratio_is_the_mean_of_the_maps_own_ratios() -> None:
     assert metrics["error_uncorrected_km2"] == pytest.approx(3.0)
     assert metrics["sensing"] == "percept-level sensing"
     assert json.loads(json.dumps(metrics)) == metrics
+
+
+def test_noise_is_fitted_on_every_second_map_by_name() -> None:
+    environments = [_named(_environment(1), name) for name in ("d", "b", "a", "c")]
+    to, others = halves(environments)
+
+    assert [each.name for each in to] == ["a", "c"]
+    assert [each.name for each in others] == ["b", "d"]
+    with pytest.raises(UsageError, match="two maps or more"):
+        halves(to[:1])
+
+
+def test_with_the_fitted_noise_the_papers_rule_errs_as_people_do() -> None:
+    environments = [_environment(seed) for seed in (1, 2)]
+
+    fits = fitted(environments, environments, 1, lambda share: None)
+
+    for fit in fits.values():
+        assert fit.fitted_km2 == pytest.approx(1.07, rel=0.05)
+        assert 0.01 < fit.noise.speed == fit.noise.turn < 1
+
+
+def test_a_map_whose_error_no_noise_makes_human_is_named_with_the_remedy() -> None:
+    small = _environment(1)
+    legs_m = tuple(leg / 100 for leg in small.legs_m)
+    tiny = replace(small, buildings_m=small.buildings_m / 100, legs_m=legs_m)
+
+    with pytest.raises(UsageError, match="give larger or other cities, or --noise"):
+        fitted([tiny], [tiny], 1, lambda share: None)
+
+
+def test_the_model_is_compared_with_people_on_tested_maps_by_mean_errors() -> None:
+    errors = {WHEELS: 3.0, "none": 4.0, "positions": 2.14, "heading": 0.214}
+    fit = Fit(NOISE, fitted_km2=1.07, tested_km2=0.535)
+
+    found = fit_metrics([_map(_environment(1), errors)], {"view": fit}, 3)
+
+    assert found["paper_over_people"] == pytest.approx(2.0)
+    assert found["ours_over_paper"] == pytest.approx(0.1)
+    assert found["rule_by_view_over_people"] == pytest.approx(0.5)
+    assert found["maps_fitted"] == 3
+    assert found["maps_tested"] == 1
+
+
+def _named(environment: Environment, name: str) -> Environment:
+    return replace(environment, name=name)
 
 
 def test_without_noise_and_confusions_the_map_is_right_and_repeatable() -> None:
