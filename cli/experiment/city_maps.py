@@ -119,11 +119,14 @@ def city_maps(
     chosen = NOISE
     if noise is not None:
         chosen = Noise(speed=noise[0], turn=noise[1], drift_rad_per_sqrt_m=noise[2])
-    fits: dict[str, Fit] = {}
-    fitted_maps = 0
+    to: list[Environment] = []
     if fit or (all_in is not None and noise is None and len(places) > 1):
         to, places = halves(places)
-        fitted_maps = len(to)
+    if people_km2 is not None:
+        people.check_number(places, people_km2)  # before hours of driving
+
+    fits: dict[str, Fit] = {}
+    if to:
         with bar("fitting the noise") as progress:
             fits = fitted(to, places, common.seed, progress)
         chosen = fits["view"].noise
@@ -135,7 +138,7 @@ def city_maps(
 
     metrics = map_metrics(found, chosen) | rules
     if fits:
-        metrics |= fit_metrics(found, fits, fitted_maps)
+        metrics |= fit_metrics(found, fits, len(to))
     if people_km2 is not None:
         metrics |= people.metrics(found, people_km2)
 

@@ -29,9 +29,8 @@ def loop_closing(common: Common) -> None:
     """Make figure 6: a path around some blocks, before and after reverse replay closes its loop.
 
     The agent drives twice: positions are corrected, by reverse replay (eq. 9 as it is printed with
-    --rules paper), or headings too. Percepts
-    are not rendered: they have the measured errors of perception. --cameras drives once more with
-    rendered images. Takes one or two minutes.
+    --rules paper), or headings too. Percepts are not rendered: they have the measured errors of
+    perception. --cameras drives once more with rendered images. Takes one or two minutes.
     """
     folder = results.folder_for(NAME, common.out)
     rules = results.show_rules(common)

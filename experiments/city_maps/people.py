@@ -63,20 +63,25 @@ def read(path: Path, environments: Sequence[Environment]) -> dict[str, float]:
     return {name: _mean_error_km2(path, by_name[name], own) for name, own in drawn.items()}
 
 
-def metrics(maps: Sequence[CityMap], people_km2: Mapping[str, float]) -> dict[str, float]:
-    """Compare the errors of maps with people's of the same maps, by name; those of other maps do
-    not count.
-
-    `human_r_paper` and `human_r2_paper` are over the maps, of the mean error by the paper's rule
-    with people's; `ours` is with headings. Raises UsageError if fewer than MIN_MAPS are matched.
-    """
-    matched = [city for city in maps if city.environment.name in people_km2]
+def check_number(environments: Sequence[Environment], people_km2: Mapping[str, float]) -> None:
+    """Raise UsageError if people drew fewer than MIN_MAPS of the environments."""
+    matched = [each for each in environments if each.name in people_km2]
     if len(matched) < MIN_MAPS:
         raise UsageError(
             f"people drew {len(matched)} of the maps that are measured, and a correlation takes "
             f"{MIN_MAPS}: give maps of more, or measure more with --maps"
         )
 
+
+def metrics(maps: Sequence[CityMap], people_km2: Mapping[str, float]) -> dict[str, float]:
+    """Compare the errors of maps with people's of the same maps, by name; those of other maps do
+    not count.
+
+    `human_r_paper` and `human_r2_paper` are over the maps, of the mean error by the paper's rule
+    with people's; `ours` is with headings. Raises UsageError as `check_number` does.
+    """
+    check_number([city.environment for city in maps], people_km2)
+    matched = [city for city in maps if city.environment.name in people_km2]
     drawn_km2 = np.array([people_km2[city.environment.name] for city in matched])
     found = {"human_maps": float(len(matched)), "human_error_km2": float(drawn_km2.mean())}
 

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
+from cogmap.cli.experiment.city_maps import city_maps
 from cogmap.errors import UsageError
 from cogmap.experiments.city_maps import people
 from cogmap.experiments.city_maps.environment import Environment, environments
@@ -83,3 +85,14 @@ def test_the_example_is_marked_as_synthetic_and_of_the_maps_of_seed_1() -> None:
     errors_km2 = people.read(EXAMPLE, grown_environments(4, 1))
     assert len(errors_km2) == 4
     assert np.ptp(list(errors_km2.values())) > 0
+
+
+def test_a_file_of_too_few_of_the_maps_is_refused_before_any_is_driven(tmp_path: Path) -> None:
+    drawn = people.template(grown_environments(2, 1))
+    options = ["--maps", "3", "--human", str(_file(tmp_path, drawn)), "--out", str(tmp_path)]
+
+    done = CliRunner().invoke(city_maps, options)
+
+    assert isinstance(done.exception, UsageError)
+    assert "people drew 2 of the maps that are measured" in str(done.exception)
+    assert "traversals" not in done.output
