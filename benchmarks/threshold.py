@@ -41,6 +41,11 @@ def at_most(limit: float) -> Threshold:
     return Threshold(maximum=limit)
 
 
+def less_than(limit: float) -> Threshold:
+    """Make a threshold that is met by less than `limit`."""
+    return Threshold(maximum=limit, exclusive=True)
+
+
 def at_least(limit: float) -> Threshold:
     """Make a threshold that is met by `limit` and more."""
     return Threshold(minimum=limit)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.report import Metrics
-from benchmarks.threshold import at_most
+from benchmarks.threshold import less_than
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Bytes, Singles
 from cogmap.services.sensory.public import STEPS_PER_PIXEL, StereoMatcher
@@ -21,7 +21,7 @@ from cogmap.services.sensory.public import STEPS_PER_PIXEL, StereoMatcher
 OFF_PX = (1, 3)
 PLAIN_BLOCK_PX = 3
 SMALLEST_SHARE = 1e-9
-THRESHOLDS = {f"stereo_off_{px}px_over_plain": at_most(1.0) for px in OFF_PX}
+THRESHOLDS = {f"stereo_off_{px}px_over_plain": less_than(1.0) for px in OFF_PX}
 Image = npt.NDArray[Any]
 
 

@@ -119,7 +119,7 @@ def refined(disparity_px: Singles, left: Singles, right: Singles) -> Singles:
 
     Brightness is compared without its local mean, since two cameras seldom agree on it. A window
     moves as a whole: where it shows more than one surface, or a part without a match, the disparity
-    of its middle stays as it is.
+    of its middle stays as it is. So it does where the windows then differ no less.
     """
     height_px, width_px = disparity_px.shape
     columns, rows = np.meshgrid(
@@ -132,18 +132,26 @@ def refined(disparity_px: Singles, left: Singles, right: Singles) -> Singles:
     min_px = disparity_px - MAX_STEP_PX
     max_px = disparity_px + MAX_STEP_PX
 
+    def errors(matched: Singles) -> Singles:
+        """Return how much brighter `right` is at those columns than `left`, less the mean."""
+        error = cv2.remap(right, matched, rows, cv2.INTER_LINEAR) - left
+        return np.asarray(error - cv2.boxFilter(error, -1, WINDOW_PX), np.float32)
+
+    first_error = errors(columns - disparity_px)
+    error = first_error
     result_px = disparity_px
     for _ in range(REFINEMENTS):
         matched = columns - result_px
         matched_slope = cv2.remap(right_slope, matched, rows, cv2.INTER_LINEAR)
-        error = cv2.remap(right, matched, rows, cv2.INTER_LINEAR) - left
-        error -= cv2.boxFilter(error, -1, WINDOW_PX)
 
         slope = 0.5 * (left_slope + matched_slope)
         curvature = cv2.boxFilter(slope * slope, -1, WINDOW_PX) + NOISE_GRADIENT
         step_px = cv2.boxFilter(slope * error, -1, WINDOW_PX) / curvature
         result_px = np.clip(result_px + step_px, min_px, max_px)
+        error = errors(columns - result_px)
 
     window = np.ones(WINDOW_PX, np.uint8)
     jump_px = cv2.dilate(disparity_px, window) - cv2.erode(disparity_px, window)
-    return np.where(jump_px > MAX_JUMP_PX, disparity_px, result_px)
+    gain = cv2.boxFilter(first_error * first_error - error * error, -1, WINDOW_PX)
+    is_refined = (jump_px <= MAX_JUMP_PX) & (gain > 0)
+    return np.where(is_refined, result_px, disparity_px)

@@ -22,7 +22,7 @@ from benchmarks.commands import benchmarks
 from benchmarks.cycle import measure as cycle
 from benchmarks.cycle.ten_hertz import superseded_share
 from benchmarks.report import Metrics, Outcome, report
-from benchmarks.threshold import Threshold, at_least, at_most, more_than, within
+from benchmarks.threshold import Threshold, at_least, at_most, less_than, more_than, within
 from cogmap.bus.codec import encode
 from cogmap.errors import UsageError
 from cogmap.parallel import parallel_map
@@ -57,10 +57,11 @@ def test_the_thresholds_are_those_of_the_keys_promised() -> None:
         (at_most(2), 2.0, 2.1),
         (at_least(2), 2.0, 1.9),
         (more_than(0), 0.1, 0.0),
+        (less_than(1), 0.9, 1.0),
         (within(0.9, 1.1), 0.9, 1.2),
         (at_most(2), 0.0, float("nan")),
     ],
-    ids=["at most", "at least", "more than", "within", "not a number"],
+    ids=["at most", "at least", "more than", "less than", "within", "not a number"],
 )
 def test_a_threshold_is_met_up_to_its_limits_and_by_no_nan(
     threshold: Threshold, met: float, missed: float

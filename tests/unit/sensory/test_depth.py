@@ -227,6 +227,17 @@ def test_a_wrong_match_or_two_are_no_obstacle() -> None:
     assert range_m[range_m > 0].min() > 15
 
 
+def test_a_disparity_stays_where_a_step_makes_the_windows_differ_no_less() -> None:
+    texture = _texture()
+    left = np.ascontiguousarray(texture[:HEIGHT, :WIDTH])
+    hidden = np.ascontiguousarray(texture[400 : 400 + HEIGHT, :WIDTH])
+    matched_px = np.full(SHAPE, 8.0, np.float32)
+
+    stays = refined(matched_px, left, hidden) == matched_px
+
+    assert 0.05 < stays.mean() < 0.5
+
+
 def test_where_two_surfaces_meet_the_disparity_stays_as_it_was_matched() -> None:
     left, right = (image[..., 0].astype(np.float32) for image in _wall(10.0))
     matched_px = np.full(SHAPE, 10.2, np.float32)
