@@ -32,7 +32,7 @@ from cogmap.experiments.city_maps.metrics import NAMES
 from cogmap.experiments.city_maps.observer import WHEELS as WHEELS_ALONE
 
 SHOWN = {
-    WHEELS_ALONE: "wheels alone",
+    WHEELS_ALONE: "wheels alone, which fused self-motion is here",
     "none": "landmarks recognised, no loop closed",
     "positions": "positions corrected (eq. 9)",
     "heading": "headings too",

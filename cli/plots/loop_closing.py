@@ -44,6 +44,7 @@ def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
         _draw_map(after, positions.after, POSITIONS, replayed)
         _draw_shifts(after, positions.before, positions.after)
         _draw_map(end, heading.end, ESTIMATE, "c   in the end, headings corrected too")
+        end.set_xlabel(f"x, m\n{_alone(metrics)}")
         above.legend(
             handles=_legend(), frameon=False, fontsize=8.5, ncols=5, loc="outside upper left"
         )
@@ -52,6 +53,13 @@ def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
         _draw_replay(shifts, positions.replays[0])
         _draw_synapses(synapses, positions.replays[0], metrics)
     return sheet
+
+
+def _alone(metrics: dict[str, Any]) -> str:
+    """Write what the path errs by path integration alone."""
+    fused_m = metrics["path_error_fused_alone_m"]
+    wheels_m = metrics["path_error_wheels_alone_m"]
+    return f"path by fused self-motion alone {fused_m:.1f} m, by wheels alone {wheels_m:.1f} m"
 
 
 def _legend() -> list[Line2D]:

@@ -24,6 +24,7 @@ from cogmap.recording import Log, open_log
 from cogmap.runtime import config as configuration
 from cogmap.runtime.config import Sections
 from cogmap.runtime.environment import CONFIG
+from cogmap.services.codelets import rules
 
 if TYPE_CHECKING:
     from cogmap.cli.launch.drive_metrics import RunMetrics
@@ -49,6 +50,7 @@ class DriveOptions(TypedDict, total=False):
     time_limit_s: float
     agent: str
     config: Path | str
+    rules: str
 
 
 class RunOptions(DriveOptions, total=False):
@@ -64,7 +66,7 @@ class RunOptions(DriveOptions, total=False):
 
 
 _FLAGS = {"explore_s": "--explore", "time_limit_s": "--time-limit"}
-_ELSEWHERE = ("config", "settings", "out")
+_ELSEWHERE = ("config", "rules", "settings", "out")
 
 
 @dataclass(frozen=True)
@@ -86,8 +88,9 @@ def run(*, quiet: bool = True, **options: Unpack[RunOptions]) -> FinishedRun:
 
     The options are those of `cogmap run`, by their names: `seed`, `town`, `tour`, `explore_s`,
     `goals` (a file), `laps`, `energy`, `recording`, `speed`, `lockstep`, `codelets`, `memory`,
-    `record`, `time_limit_s`, `connect`, `agent`, `config`, and `out`, a new folder.
-    `settings` override those of `config`. Unless `quiet`, the progress is printed.
+    `record`, `time_limit_s`, `connect`, `agent`, `config`, `rules`, and `out`, a new folder.
+    `rules`, such as "paper", override `config`, and `settings` override both. Unless `quiet`, the
+    progress is printed.
 
         run = cogmap.run(town="blocks", seed=2, lockstep=True, settings={"sim.duration_s": 20})
         print(run.summary.estimate.mean_m, run.folder)
@@ -154,12 +157,16 @@ def _words_of(name: str, value: object) -> list[str]:
 
 
 def settings_of(options: RunOptions) -> Sections:
-    """Return the settings of `options`: those of its file, or of $COGMAP_CONFIG's, overridden.
+    """Return the settings of `options`: those of its file, or of $COGMAP_CONFIG's, overridden by
+    those of its rules, and by its own.
 
-    Raises ConfigError for a file that cannot be read and for settings that cannot be.
+    Raises ConfigError for a file that cannot be read and for settings that cannot be, UsageError
+    for rules that there are not.
     """
     path = options.get("config") or os.environ.get(CONFIG)
-    sections = configuration.load(Path(path) if path else None)
+    chosen = options.get("rules")
+    of_rules = [] if chosen is None else rules.settings_of(chosen)
+    sections = configuration.load(Path(path) if path else None, of_rules)
     for key, value in (options.get("settings") or {}).items():
         section, dot, name = key.partition(".")
         if not (section and dot and name):

@@ -10,7 +10,7 @@ import click
 from click.core import ParameterSource
 
 from cogmap.cli.files import save
-from cogmap.cli.options import FiniteRange, json_option
+from cogmap.cli.options import FiniteRange, json_option, rules_option
 from cogmap.cli.printing import print_json, print_table
 from cogmap.cli.run.options import (
     codelets_option,
@@ -35,6 +35,7 @@ _EPILOG = """\b
 Examples:
   cogmap sweep --seeds 1-5 --town blocks --explore 30
   cogmap sweep --seeds 1-5 --vary motor.cruise_m_s=2,3,4 --processes 4
+  cogmap sweep --seeds 1-5 --rules paper --out runs/paper    by the paper's own rules
   cogmap sweep --seeds 1,4,9 --tour --out runs/tours --csv tours.csv
 """
 
@@ -61,6 +62,7 @@ Examples:
 @laps_option
 @energy_option
 @codelets_option
+@rules_option
 @click.option(
     "--lockstep/--real-time",
     default=True,

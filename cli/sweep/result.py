@@ -24,13 +24,16 @@ Figure = bool | int | float | str
 SHOWN = {
     "distance_m": "driven m",
     "goals_reached": "goals",
-    "estimate.mean_m": "mean error m",
-    "estimate.max_m": "max error m",
-    "fused_alone.mean_m": "fused alone m",
-    "error_over_fused": "error ratio",
+    "estimate.mean_m": "error m",
+    "estimate.max_m": "at most m",
+    "fused_alone.mean_m": "fused m",
+    "wheels_alone.mean_m": "wheels m",
+    "error_over_fused": "over fused",
     "objects": "objects",
 }
-"""The figures that the table on the screen has, and their columns."""
+"""The figures that the table on the screen has, and their columns: the mean error of the estimate,
+beside those of path integration alone.
+"""
 
 
 @dataclass(frozen=True)

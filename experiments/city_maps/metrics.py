@@ -35,7 +35,7 @@ def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
     Corrected is with headings, beyond the paper; `positions` corrects these alone, by reverse
     replay or, with the paper's rules, by eq. 9 as it is printed. Uncorrected
     is the map of an agent that recognises landmarks but closes no loops; `wheels_alone` the map by
-    path integration alone, which without images is that of the wheels.
+    path integration alone, which without images is that of fused self-motion, too.
     """
     metrics: Metrics = {}
     errors_km2 = {}
@@ -46,7 +46,8 @@ def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
         ratio = errors_km2[name] / errors_km2["uncorrected"]
         metrics[f"error_{name}_over_uncorrected"] = float(ratio.mean())
     over_wheels = errors_km2["corrected"] / errors_km2["wheels_alone"]
-    metrics["error_corrected_over_wheels_alone"] = float(over_wheels.mean())
+    metrics["error_corrected_over_fused_alone"] = float(over_wheels.mean())
+    metrics["error_fused_alone_km2"] = float(errors_km2["wheels_alone"].mean())
 
     for name, values_km2 in errors_km2.items():
         metrics[f"error_{name}_km2"] = float(values_km2.mean())
@@ -146,6 +147,8 @@ def camera_metrics(drawn: Learned, percepts: Learned) -> Metrics:
         ratio = errors_km2[method] / errors_km2["none"]
         metrics[f"cameras_error_{NAMES[method]}_over_uncorrected"] = ratio
 
+    over_fused = errors_km2[HEADING] / errors_km2[FUSED]
+    metrics["cameras_error_corrected_over_fused_alone"] = over_fused
     metrics["cameras_buildings_missing"] = float(drawn.missing)
     return metrics
 

@@ -25,7 +25,8 @@ def loop_metrics(loops: Mapping[str, Loop]) -> Metrics:
     `positions` corrects these alone, by reverse replay or, with the paper's rules, by eq. 9 as it
     is printed; `heading` is ours. `path_error_wheels_alone_m` and
     `path_error_fused_alone_m` are of the path by path integration alone: of the wheels, and of
-    self-motion as the agent has it; they are the same if no images are taken.
+    self-motion as the agent has it; they are the same if no images are taken. `path_over_fused_...`
+    is the path's error in the end over the latter.
     """
     metrics: Metrics = {}
     for method, loop in loops.items():
@@ -39,7 +40,11 @@ def loop_metrics(loops: Mapping[str, Loop]) -> Metrics:
     loop = loops["positions"]
     true_path_m = loop.end.true_path_m
     metrics["path_error_wheels_alone_m"] = rms_m(loop.wheels_path_m - true_path_m)
-    metrics["path_error_fused_alone_m"] = rms_m(loop.fused_path_m - true_path_m)
+    fused_m = rms_m(loop.fused_path_m - true_path_m)
+    metrics["path_error_fused_alone_m"] = fused_m
+    if fused_m > 0:
+        for method, each in loops.items():
+            metrics[f"path_over_fused_{method}"] = each.end.path_error_m / fused_m
 
     # The change of synapses for a metre that place fields come nearer is k, if they are close.
     replay = loop.replays[0]

@@ -7,6 +7,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from cogmap.errors import UsageError
+
 RULES = {
     "localization": "codelets",
     "closes_by": "codelets",
@@ -34,7 +36,10 @@ PRESETS: dict[str, dict[str, str]] = {
 
 
 def settings_of(preset: str) -> list[str]:
-    """Write a preset as the values of `--set`."""
+    """Write a preset as the values of `--set`. Raises UsageError if there is none of that name."""
+    if preset not in PRESETS:
+        raise UsageError(f"rules {preset!r}: choose {' or '.join(PRESETS)}")
+
     return [f"{RULES[rule]}.{rule}={value}" for rule, value in PRESETS[preset].items()]
 
 

@@ -11,6 +11,7 @@ import pytest
 from cogmap.cli.run.child import failure
 from cogmap.cli.run.script import RunOptions, settings_of, summary_after, summary_in, words
 from cogmap.errors import CogmapError, ConfigError, UsageError
+from cogmap.services.codelets.rules import PRESETS, rules_of
 from tests.support.world.summaries import summary, write_summary
 
 
@@ -53,6 +54,24 @@ def test_settings_override_those_of_the_file(tmp_path: Path) -> None:
         "motor": {"cruise_m_s": 2.0},
     }
     assert not Path(written).exists()
+
+
+def test_rules_override_the_file_and_settings_override_rules(tmp_path: Path) -> None:
+    path = tmp_path / "base.toml"
+    path.write_text("[codelets]\ncorrect = 'heading'\nsamples = 90\n")
+    own = {"planning.planning": "hierarchy"}
+
+    options: RunOptions = {"config": path, "rules": "paper", "settings": own}
+    chosen = settings_of(options)
+
+    assert chosen["codelets"]["samples"] == 90
+    assert rules_of(chosen) == PRESETS["paper"] | {"planning": "hierarchy"}
+    assert "--rules" not in words_of(options)
+
+
+def test_rules_that_there_are_not_are_named() -> None:
+    with pytest.raises(UsageError, match="rules 'papers': choose paper or cogmap"):
+        settings_of({"rules": "papers"})
 
 
 def test_the_file_of_settings_may_be_that_of_the_environment(

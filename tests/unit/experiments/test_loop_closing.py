@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -102,6 +104,17 @@ def test_errors_are_measured_before_and_after_correction_and_in_the_end() -> Non
     assert metrics["end_error_in_the_end_m_heading"] == pytest.approx(3.0)
     assert metrics["path_error_wheels_alone_m"] == pytest.approx(6.0)
     assert metrics["path_error_fused_alone_m"] == 0.0
+    assert "path_over_fused_heading" not in metrics
+
+
+def test_the_path_is_compared_with_fused_self_motion_alone() -> None:
+    drifting_m = np.zeros((5, 2)) + np.array([0.0, 12.0])
+    loops = {method: replace(_loop(3.0), fused_path_m=drifting_m) for method in METHODS}
+
+    metrics = loop_metrics(loops)
+
+    assert metrics["path_error_fused_alone_m"] == pytest.approx(12.0)
+    assert metrics["path_over_fused_heading"] == pytest.approx(0.25)
 
 
 def test_where_only_distances_err_the_rule_leaves_a_brownian_bridge() -> None:

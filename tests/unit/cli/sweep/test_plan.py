@@ -9,6 +9,7 @@ import pytest
 from cogmap.cli.run.script import DriveOptions
 from cogmap.cli.sweep.plan import PLAN_NAME, PlannedDrive, left_to_drive, plan
 from cogmap.errors import StorageError, UsageError
+from cogmap.services.codelets.rules import PRESETS, rules_of
 from tests.support.world.summaries import summary, write_summary
 
 BLOCKS: DriveOptions = {"town": "blocks"}
@@ -36,6 +37,15 @@ def test_there_is_a_drive_for_each_variant_and_seed(tmp_path: Path) -> None:
         "sim": {"duration_s": 5.0},
         "motor": {"cruise_m_s": 4.0},
     }
+
+
+def test_a_drive_by_other_rules_is_another_drive(tmp_path: Path) -> None:
+    (ours,) = plan(tmp_path, [1], [{}], {}, BLOCKS)
+    (papers,) = plan(tmp_path, [1], [{}], {}, {**BLOCKS, "rules": "paper"})
+
+    assert papers.request["options"] == ours.request["options"]
+    assert rules_of(papers.request["settings"]) == PRESETS["paper"]
+    assert rules_of(ours.request["settings"]) == PRESETS["cogmap"]
 
 
 def test_a_value_with_a_path_in_it_names_a_folder(tmp_path: Path) -> None:
