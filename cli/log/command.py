@@ -14,6 +14,10 @@ VERBS = {
     "map": ("cogmap.cli.log.summary:draw_map", "Draw the true town and the learned map."),
     "image": ("cogmap.cli.log.pictures:image", "Save a camera image."),
     "perception": ("cogmap.cli.log.pictures:perception", "Draw what was perceived in a view."),
+    "predictions": (
+        "cogmap.cli.log.predictions:predictions",
+        "Draw what a drive predicts of place cells.",
+    ),
     "export": (
         "cogmap.cli.log.export:export",
         "Write a log for other tools: tables, Foxglove, Rerun, ROS.",
@@ -37,6 +41,7 @@ A first session, while `cogmap run` runs in another terminal:
   cogmap log map drive.mcap           the true town and the learned map
   cogmap log cat drive.mcap action/selected
   cogmap log image drive.mcap         a camera image, as a file
+  cogmap log predictions drive.mcap   replays, shifts of place fields, synapses
   cogmap log replay drive.mcap --into sensory
   cogmap log export drive.mcap --csv tables
   cogmap log filter drive.mcap small.mcap -x 'camera|view'

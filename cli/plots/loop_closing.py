@@ -22,8 +22,9 @@ from cogmap.cli.plots.palette import (
     UNCORRECTED,
 )
 from cogmap.cli.plots.sheet import describe, new_sheet
-from cogmap.experiments.loop_closing.observer import Loop, Map, Replayed
+from cogmap.experiments.loop_closing.observer import Loop, Map
 from cogmap.experiments.loop_closing.run import SENSING
+from cogmap.experiments.predictions.replayed import Replayed
 
 DASHED = (0, (4, 2))
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 
-from cogmap.experiments.loop_closing.observer import Loop, Replayed, rms_m
+from cogmap.experiments.loop_closing.observer import Loop, rms_m
 from cogmap.experiments.loop_closing.rule import close_laps
 from cogmap.experiments.loop_closing.run import CORNERS_M, FRAME_HZ, NOISE, SPEED_M_S
+from cogmap.experiments.predictions.replayed import strength_fit
 from cogmap.services.sim.odometry import Noise
 
 LAPS = 1000
-MIN_PAIRS = 3
 ERRORS = ("path_error", "object_error", "end_error")
 Metrics = dict[str, float]
 
@@ -49,25 +48,8 @@ def loop_metrics(loops: Mapping[str, Loop]) -> Metrics:
     # The change of synapses for a metre that place fields come nearer is k, if they are close.
     replay = loop.replays[0]
     metrics["synapse_decay_per_m"] = replay.decay_per_m
-    metrics |= _fit("close_pairs", replay, replay.close)
-    return metrics | _fit("all_pairs", replay, np.ones_like(replay.close))
-
-
-def _fit(name: str, replay: Replayed, pairs: npt.NDArray[np.bool_]) -> Metrics:
-    nearer_m = replay.nearer_m[pairs]
-    changes = replay.strength_changes[pairs]
-    slope = 0.0
-    correlation = 0.0
-
-    if len(nearer_m) >= MIN_PAIRS and np.ptp(nearer_m) > 0:
-        slope = float(np.polyfit(nearer_m, changes, 1)[0])
-        correlation = float(np.corrcoef(nearer_m, changes)[0, 1])
-
-    return {
-        name: float(len(nearer_m)),
-        f"strength_change_per_m_{name}": slope,
-        f"strength_and_shift_correlation_{name}": correlation,
-    }
+    metrics |= strength_fit("close_pairs", replay, replay.close)
+    return metrics | strength_fit("all_pairs", replay, np.ones_like(replay.close))
 
 
 def rule_metrics(seed: int) -> Metrics:

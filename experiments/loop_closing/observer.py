@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from cogmap.errors import CogmapError
 from cogmap.experiments import reading
 from cogmap.experiments.dead_reckoning import DeadReckoning
+from cogmap.experiments.predictions.replayed import Replayed
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
@@ -50,41 +50,6 @@ class Map:
         """Return the distance of the agent's estimate from where it is."""
         dx_m, dy_m = self.path_m[-1] - self.true_path_m[-1]
         return float(np.hypot(dx_m, dy_m))
-
-
-@dataclass(frozen=True)
-class Replayed:
-    """A reverse replay: `shifts_m` (n,) of the place fields in its order, and changes of synapses.
-
-    `nearer_m` (m,) is by how much the fields of each pair of place cells come nearer. `close` marks
-    the pairs near enough, before and after, for exp(-k d) to be about linear: less than 1/k apart.
-    """
-
-    passes: int
-    decay_per_m: float
-    shifts_m: Floats
-    nearer_m: Floats
-    strength_changes: Floats
-    close: npt.NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, replay: Replay) -> Replayed:
-        """Make it from the event on the bus."""
-        before_m = np.asarray(replay.positions_m.numpy(), float)
-        shifts_m = np.asarray(replay.shifts_m.numpy(), float)
-        pairs = np.asarray(replay.pairs.numpy(), np.int64)
-        apart_before_m = _distances_m(before_m, pairs)
-        apart_after_m = _distances_m(before_m + shifts_m, pairs)
-        farthest_m = np.maximum(apart_before_m, apart_after_m)
-
-        return cls(
-            passes=replay.replays,
-            decay_per_m=replay.decay_per_m,
-            shifts_m=np.hypot(*shifts_m.T),
-            nearer_m=apart_before_m - apart_after_m,
-            strength_changes=np.asarray(replay.strength_changes.numpy(), float),
-            close=farthest_m * replay.decay_per_m < 1,
-        )
 
 
 @dataclass(frozen=True)
@@ -198,10 +163,3 @@ def rms_m(offsets_m: Floats) -> float:
 
     squared_m2 = np.square(offsets_m).sum(axis=1)
     return float(np.sqrt(squared_m2.mean()))
-
-
-def _distances_m(positions_m: Floats, pairs: npt.NDArray[np.int64]) -> Floats:
-    """Return the distance between the two places of each of (m, 2) pairs, (m,)."""
-    first, second = pairs.T
-    offsets_m = positions_m[first] - positions_m[second]
-    return np.asarray(np.hypot(*offsets_m.T))

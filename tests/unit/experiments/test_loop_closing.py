@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from cogmap.experiments.loop_closing.metrics import loop_metrics
-from cogmap.experiments.loop_closing.observer import Loop, Map, Replayed
+from cogmap.experiments.loop_closing.observer import Loop, Map
 from cogmap.experiments.loop_closing.rule import close_laps
 from cogmap.experiments.loop_closing.run import CORNERS_M, METHODS, trajectory
+from cogmap.experiments.predictions.replayed import Replayed
 from cogmap.schemas.array import Array
 from cogmap.schemas.cognition import Replay
 from cogmap.services.sim.odometry import Noise
