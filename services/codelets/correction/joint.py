@@ -8,6 +8,7 @@ import numpy as np
 
 from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pose_graph import PoseGraph
+from cogmap.estimation.windings import optimize_windings
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import FULL_TURN_RAD
 from cogmap.services.codelets.config import Config
@@ -37,7 +38,7 @@ def optimize_jointly(
     # Ranges are led from what is believed, which they have corrected before: each correction begins
     # where the last one ended.
     is_heard_alone = len(heard.place) > 0 and not len(seen.place)
-    poses = graph.poses if is_heard_alone else optimize(graph)
+    poses = graph.poses if is_heard_alone else optimize_windings(graph)
     if not len(seen.place) and not is_heard_alone:
         return poses, 1
 
