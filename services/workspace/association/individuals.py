@@ -69,7 +69,8 @@ GATE = 3.0
 """Standard deviations within which nearly all normal errors are."""
 
 MAX_REACH_M = 100.0
-"""Objects are looked for so far around at most, so that a lost agent does not look at all."""
+"""Objects are looked for so far around at most, so that a lost agent does not look at all: farther,
+but within its uncertainty, only the one that a percept looks like most."""
 
 ESTABLISHED = 3
 """An object that was seen so often stands where it is."""
@@ -156,8 +157,12 @@ class Individuals:
     ) -> tuple[list[Object], list[Possible]]:
         """Find the objects that each percept may be of, and how much it looks like them."""
         candidates: dict[str, Object] = {}
-        in_reach = [self._in_reach(percept, agent, belief) for percept in seen]
-        for near in in_reach:
+        in_reach = []
+        for percept, look in zip(seen, looks, strict=True):
+            near = self._in_reach(percept, agent, belief)
+            if look.alike is not None and _is_beyond(look.alike, near, percept, agent, belief):
+                near.append(look.alike)
+            in_reach.append(near)
             candidates |= {node.label: node for node in near}
 
         known = list(candidates.values())
@@ -188,18 +193,10 @@ class Individuals:
         """Return the objects of the agent's map that stand where a percept may be of them, the
         nearest MAX_CANDIDATES.
         """
-        x_m, y_m, _ = belief.means[0].tolist()
-        sd_m = math.sqrt(
-            float(belief.covariances[:, 0, 0].max() + belief.covariances[:, 1, 1].max())
-        )
-        within_m = percept.range_m if percept.has_range else FARTHEST_M
-        if percept.has_place:
-            x_m, y_m = place_m(percept, belief)
-            within_m = 0.0
-
-        within_m += NEAR_M + GATE * math.hypot(percept.range_sd_m, sd_m)
+        middle_m, within_m = _reach(percept, belief)
+        x_m, y_m = middle_m
         nodes = self.known.near(agent.map, x_m, y_m, min(within_m, MAX_REACH_M))
-        nodes.sort(key=lambda node: (math.dist((x_m, y_m), (node.x_m, node.y_m)), node.label))
+        nodes.sort(key=lambda node: (math.dist(middle_m, (node.x_m, node.y_m)), node.label))
         return nodes[:MAX_CANDIDATES]
 
     def _stands_clear(self, percept: Percept, agent: Self, belief: Belief) -> bool:
@@ -245,6 +242,32 @@ def place_m(percept: Percept, belief: Belief) -> tuple[float, float]:
         x_m + percept.range_m * math.cos(direction_rad),
         y_m + percept.range_m * math.sin(direction_rad),
     )
+
+
+def _reach(percept: Percept, belief: Belief) -> tuple[tuple[float, float], float]:
+    """Return the middle of where a percept's object may stand, and how far from it, in m."""
+    x_m, y_m, _ = belief.means[0].tolist()
+    middle_m = (x_m, y_m)
+    sd_m = math.sqrt(float(belief.covariances[:, 0, 0].max() + belief.covariances[:, 1, 1].max()))
+    within_m = percept.range_m if percept.has_range else FARTHEST_M
+    if percept.has_place:
+        middle_m = place_m(percept, belief)
+        within_m = 0.0
+
+    return middle_m, within_m + NEAR_M + GATE * math.hypot(percept.range_sd_m, sd_m)
+
+
+def _is_beyond(
+    node: Object, near: Sequence[Object], percept: Percept, agent: Self, belief: Belief
+) -> bool:
+    """Decide whether an object is not among those `near`, but stands on the agent's map where the
+    percept may be of it.
+    """
+    if node.map != agent.map or any(node.id == each.id for each in near):
+        return False
+
+    middle_m, within_m = _reach(percept, belief)
+    return math.dist(middle_m, (node.x_m, node.y_m)) <= within_m
 
 
 def _is_here(

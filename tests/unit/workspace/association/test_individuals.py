@@ -141,6 +141,15 @@ def test_where_nothing_fits_and_the_agent_may_be_elsewhere_it_is_of_what_it_look
     assert _labels(known, *seen, frame=UNSURE_FRAME) == ["41a", "52b"]
 
 
+def test_a_lost_agent_compares_a_percept_with_its_like_however_far_off() -> None:
+    known = [_house("41a", 20.0, 0.0, name="inn"), _house("52b", 300.0, 0.0, name="mill")]
+    anywhere_m = np.random.default_rng(1).normal(0.0, 150.0, (200, 2))
+    lost = agent(np.column_stack([anywhere_m, np.zeros(200)]))
+
+    assert _labels(known, _sight("mill", 20.0, 5.0), looker=lost) == ["52b"]
+    assert _labels(known, _sight("mill", 20.0, 5.0)) != ["52b"]
+
+
 def test_what_is_too_far_to_enter_the_map_does_not_tell_that_the_agent_is_elsewhere() -> None:
     known = [_house("41a", 20.0, 0.0, name="inn"), _house("52b", 30.0, 0.0, name="mill")]
     far = (
