@@ -39,19 +39,26 @@ def command(scan: dict[str, Any], number: int) -> dict[str, Any]:
         if abs(bearing_rad) < AHEAD_RAD and 0 < range_m < CLEARANCE_M:
             blocked = True
 
+    # The fields in the order of the schema: then the bytes are those of the same module of ours.
     return {
         "stamp_ns": scan["stamp_ns"],
         "seq": number,
         "source": INSTANCE,
         "left_wheel_rad_s": 0.0 if blocked else CRUISE_RAD_S,
         "right_wheel_rad_s": CRUISE_RAD_S,
+        "halted_by": "",
+        "slowed_by": "",
+        "pose_age_ns": 0,
     }
 
 
-def envelope(number: int, cause: list[Any]) -> list[Any]:
-    """Make the envelope of an answer: source, number, incarnation, sent, born, stages, causes."""
-    born_ns = cause[4]
-    return [INSTANCE, number, STARTED_NS, time.time_ns(), born_ns, [], []]
+def envelope(number: int, scan: dict[str, Any], received: list[Any]) -> list[Any]:
+    """Make the envelope of the answer to a scan, by the envelope that was received with it: source,
+    number, incarnation, sent, born, stages, causes.
+    """
+    born_ns = received[4]
+    causes = [("sensory/scan", scan["source"], scan["seq"])]
+    return [INSTANCE, number, STARTED_NS, time.time_ns(), born_ns, [], causes]
 
 
 def configuration(endpoint: str) -> zenoh.Config:
@@ -86,10 +93,10 @@ def run(endpoint: str, agent: str, stop: threading.Event) -> None:
             if sample.attachment is None:
                 continue
             scan = msgpack.unpackb(bytes(sample.payload))
-            cause = msgpack.unpackb(bytes(sample.attachment))
+            received = msgpack.unpackb(bytes(sample.attachment))
             commands.put(
                 msgpack.packb(command(scan, number)),
-                attachment=msgpack.packb(envelope(number, cause)),
+                attachment=msgpack.packb(envelope(number, scan, received)),
             )
             number += 1
         ready.undeclare()  # type: ignore[no-untyped-call]

@@ -1,0 +1,128 @@
+// Is the output of the wanderer the same as in a log? `node replay.mjs LOG`, after `npm ci`.
+//
+// Ends with 1 if a byte differs, and names the first difference.
+
+import { pathToFileURL } from "node:url";
+
+import { COMMAND, SCAN, decode, encode } from "./messages.mjs";
+import { read } from "./recording.mjs";
+import { INSTANCE, Wanderer } from "./wanderer.mjs";
+
+/**
+ * Replay what a log holds: each process that sent commands by itself, from its first command on,
+ * with its inputs in the order of the causes that it named. Returns how many commands are the same
+ * to the byte, how many are not, and the first of these in words.
+ */
+export function replay(recorded) {
+  const commands = recorded.filter(
+    ({ envelope }) => envelope.topic === COMMAND && envelope.source === INSTANCE,
+  );
+  if (commands.length === 0) {
+    throw new Error(`the log holds no ${COMMAND} of ${INSTANCE}`);
+  }
+  commands.sort((one, other) => order(one.envelope, other.envelope));
+
+  const found = { same: 0, different: 0, first: null };
+  let wanderer = null;
+  let incarnation = null;
+  for (const command of commands) {
+    const { envelope } = command;
+    if (envelope.incarnation !== incarnation) {
+      wanderer = new Wanderer(envelope.seq);
+      incarnation = envelope.incarnation;
+    }
+
+    const clause = difference(wanderer, command, recorded);
+    if (clause === null) {
+      found.same += 1;
+    } else {
+      found.different += 1;
+      found.first ??= `${COMMAND} number ${envelope.seq} of ${INSTANCE}: ${clause}`;
+    }
+  }
+  return found;
+}
+
+function order(one, other) {
+  if (one.incarnation !== other.incarnation) {
+    return one.incarnation < other.incarnation ? -1 : 1;
+  }
+  return one.seq - other.seq;
+}
+
+/** Return what differs between a recorded command and the answer to its causes, null if nothing. */
+function difference(wanderer, command, recorded) {
+  const answers = [];
+  for (const cause of command.envelope.causes) {
+    const [topic, source, number] = cause;
+    if (topic !== SCAN) {
+      return `a ${topic} led to it, which the wanderer does not receive`;
+    }
+
+    const name = `${topic} number ${number} of ${source}`;
+    const input = named(cause, command.envelope.sent_ns, recorded);
+    if (input === undefined) {
+      return `the log lacks ${name}, which led to it`;
+    }
+    try {
+      answers.push(encode(wanderer.onScan(decode(input.payload))));
+    } catch (error) {
+      return `${name} is refused: ${error.message}`;
+    }
+  }
+
+  if (answers.length !== 1) {
+    return `${answers.length} scans led to it, not 1`;
+  }
+  return inWords(command.payload, answers[0]);
+}
+
+/** Return the message that a cause names, of the newest process that had sent it by `sentNs`. */
+function named([topic, source, number], sentNs, recorded) {
+  const found = recorded.filter(({ envelope }) => {
+    const isNamed = envelope.topic === topic && envelope.source === source;
+    return isNamed && envelope.seq === number && envelope.sent_ns <= sentNs;
+  });
+  found.sort((one, other) => (one.envelope.sent_ns < other.envelope.sent_ns ? -1 : 1));
+  return found.at(-1);
+}
+
+/** Return the first field in which two messages differ, null if their bytes are the same. */
+function inWords(logged, replayed) {
+  if (Buffer.compare(logged, replayed) === 0) {
+    return null;
+  }
+
+  const left = decode(logged);
+  const right = decode(replayed);
+  for (const [name, value] of Object.entries(left)) {
+    const other = right[name] ?? "absent";
+    if (String(value) !== String(other)) {
+      return `${name} is ${value} in the log, ${other} in the replay`;
+    }
+  }
+  return "the same values in other bytes, or in another order";
+}
+
+async function main(path) {
+  if (path === undefined) {
+    console.error("replay: name a log, such as runs/latest/log.mcap");
+    return 2;
+  }
+
+  try {
+    const { same, different, first } = replay(await read(path, [SCAN, COMMAND]));
+    console.log(`motor: ${same} commands the same to the byte, ${different} not`);
+    if (first !== null) {
+      console.log(`first difference: ${first}`);
+    }
+    return first === null ? 0 : 1;
+  } catch (error) {
+    console.error(`replay: ${path}: ${error.message}`);
+    return 2;
+  }
+}
+
+if (import.meta.url === pathToFileURL(process.argv[1] ?? "").href) {
+  process.exitCode = await main(process.argv[2]);
+}
