@@ -27,7 +27,7 @@ NAME = "cue-integration"
 _EPILOG = """\b
 Examples:
   cogmap experiment cue-integration --json cue.json
-  cogmap experiment cue-integration --seeds 20         how much the metrics vary with chance
+  cogmap experiment cue-integration --seeds 1          one seed, in half a minute
   cogmap experiment cue-integration --fit              fit the noise of the senses first
   cogmap experiment cue-integration --range-only       distances alone, as in the paper's table 1
   cogmap experiment cue-integration --landmark-noise 0.03   landmarks far better than self-motion
@@ -38,14 +38,14 @@ Examples:
 @click.option(
     "--trials",
     type=click.IntRange(8, 100_000),
-    default=200,
+    default=100,
     show_default=True,
     help="Trials of each condition, with each seed.",
 )
 @click.option(
     "--seeds",
     type=click.IntRange(1, 1000),
-    default=1,
+    default=20,
     show_default=True,
     help="Seeds to run, from --seed on.",
 )

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -50,7 +51,7 @@ class Room:
 
     def __init__(self, trial: Trial) -> None:
         self._trial = trial
-        self._rng = trial.generator()
+        self._rng = trial.generator_of_walk()
         self._pose = Pose(*START, START_HEADING_RAD)
         self._landmarks = LANDMARKS
         self._to_pick = list(trial.route)
@@ -103,12 +104,17 @@ class Room:
         motions = felt if self._feels_steps else senses.UNKNOWN
         return self._sensed(motions, self._seen(picked))
 
+    def return_in(self, condition: Condition) -> None:
+        """Have the room change as in another condition, if it has not changed yet."""
+        self._trial = replace(self._trial, condition=condition)
+
     def close(self) -> None:
         """Leave whatever is open for the trial."""
 
     def _change(self) -> list[Message]:
         """Change the room, eyes closed, before the participant walks back."""
         condition = self._trial.condition
+        self._rng = self._trial.generator_of_return()
         self._are_lit = condition is not Condition.SELF_MOTION
 
         if condition is Condition.CONFLICT:

@@ -5,12 +5,19 @@ from __future__ import annotations
 import gc
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 
 from cogmap.errors import CogmapError
-from cogmap.experiments.cue_integration import agent, analysis, participant, published, room
+from cogmap.experiments.cue_integration import (
+    agent,
+    analysis,
+    participant,
+    published,
+    room,
+    walk,
+)
 from cogmap.experiments.cue_integration.analysis import Gaussian
 from cogmap.experiments.cue_integration.fit import SELF_MOTION, coordinate_descent
 from cogmap.experiments.cue_integration.geometry import Points
@@ -229,25 +236,26 @@ def measure_seeds(
     """Run the trials of each condition with as many `seeds`, from the budget's on: an outcome for
     each.
     """
-    jobs = []
+    trials = []
     for seed in range(budget.seed, budget.seed + seeds):
-        for condition in conditions:
-            for number in range(budget.trials):
-                jobs.append(Trial(condition, number, noise, seed, budget.rules))
+        for number in range(budget.trials):
+            trials.append(Trial(conditions[0], number, noise, seed, budget.rules))
 
-    responses = parallel_map(respond, jobs, budget.processes, budget.progress)
-    shift_m = analysis.shift_m(jobs)
-    placed = [response.position for response in responses]
-    first_looks = [response.first_look for response in responses]
+    respond_in = partial(walk.responses, conditions=conditions)
+    responses = parallel_map(respond_in, trials, budget.processes, budget.progress)
+    shift_m = analysis.shift_m(trials)
 
     outcomes = []
-    for seed in range(seeds):
+    for begin in range(0, len(trials), budget.trials):
+        own = trials[begin : begin + budget.trials]
+        of_conditions = zip(*responses[begin : begin + budget.trials], strict=True)
         errors_m = {}
         first_look_m = {}
-        for place, condition in enumerate(conditions, start=seed * len(conditions)):
-            own = slice(place * budget.trials, (place + 1) * budget.trials)
-            errors_m[condition] = analysis.errors(jobs[own], placed[own])
-            first_look_m[condition] = analysis.errors(jobs[own], first_looks[own])
+        for condition, found in zip(conditions, of_conditions, strict=True):
+            placed = [response.position for response in found]
+            first_looks = [response.first_look for response in found]
+            errors_m[condition] = analysis.errors(own, placed)
+            first_look_m[condition] = analysis.errors(own, first_looks)
 
         outcomes.append(Outcome(noise, errors_m, shift_m, first_look_m))
 

@@ -63,10 +63,14 @@ class Trial:
         is_even = rounds % 2 == 0
         return 1 if is_even else -1
 
-    def generator(self) -> np.random.Generator:
-        """Return the world's own noise in this trial."""
+    def generator_of_walk(self) -> np.random.Generator:
+        """Return the world's own noise on the way to the posts, the same in all conditions."""
+        return np.random.default_rng([self.seed, self.number])
+
+    def generator_of_return(self) -> np.random.Generator:
+        """Return the world's own noise on the way back."""
         condition = list(Condition).index(self.condition)
-        return np.random.default_rng([self.seed, condition, self.number])
+        return np.random.default_rng([self.seed, self.number, condition])
 
     @property
     def target(self) -> Point:

@@ -295,7 +295,7 @@ def test_a_drive_that_is_stopped_ends_the_system(compose: Compose) -> None:
 
 
 def test_the_image_has_the_experiments(image: None) -> None:
-    command = ["experiment", "cue-integration", "--trials", "8", "--processes", "1"]
+    command = ["experiment", "cue-integration", "--trials", "8", "--seeds", "1"]
 
     output = docker("run", "--rm", "cogmap", *command)
 

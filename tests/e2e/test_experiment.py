@@ -27,7 +27,7 @@ def test_cue_integration_gives_the_same_bytes_through_real_processes(
 ) -> None:
     out = tmp_path / "out"
     chosen = tmp_path / "cue.json"
-    options = ("--trials", "8", "--live", "--seed", "3")
+    options = ("--trials", "8", "--seeds", "1", "--live", "--seed", "3")
 
     done = _run("cue-integration", *options, "--out", str(out), "--json", str(chosen))
     assert done.returncode == 0, done.stdout + done.stderr

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import pytest
 
-from cogmap.experiments.cue_integration import analysis
+from cogmap.experiments.cue_integration import analysis, walk
 from cogmap.experiments.cue_integration.analysis import Gaussian
 from cogmap.experiments.cue_integration.fit import coordinate_descent
 from cogmap.experiments.cue_integration.geometry import (
@@ -186,6 +186,15 @@ def test_a_trial_publishes_the_same_bytes_each_time_and_another_others() -> None
     assert same_messages == messages
     assert messages["workspace/delta"]
     assert messages["workspace/delta"] != others["workspace/delta"]
+
+
+def test_each_return_from_one_walk_is_that_of_a_trial_on_the_bus() -> None:
+    conditions = tuple(Condition)
+    returns = walk.responses(_trial(Condition.BOTH, 3), conditions)
+
+    alone = [Session(_trial(condition, 3)).run() for condition in conditions]
+    assert returns == alone
+    assert len({response.position for response in returns}) == len(conditions)
 
 
 def _trials(condition: Condition) -> list[Trial]:
