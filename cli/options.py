@@ -29,8 +29,8 @@ rules_option = click.option(
     "--rules",
     type=click.Choice([*PRESETS]),
     help="The rules by which the agent localizes, closes loops, corrects its map and plans: paper "
-    "has those of Madl et al. (2016) as printed, cogmap ours. Without it the settings decide, "
-    "cogmap's by default.",
+    "has those of Madl et al. (2016) as printed, cogmap ours, spiking ours with localization by "
+    "spikes. Without it the settings decide, cogmap's by default.",
 )
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 wait_option = click.option(

@@ -15,7 +15,7 @@ from benchmarks.spiking.measure import SIDE_M, Scene, recording
 from benchmarks.spiking.raster import draw_raster
 from cogmap.cli.plots.draw import STYLE
 from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, KERB, PAPER, TRUE
-from cogmap.experiments.spiking.cells import (
+from cogmap.estimation.spiking.cells import (
     PLACE_M,
     SPACINGS_M,
     BorderCells,

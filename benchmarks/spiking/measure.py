@@ -13,7 +13,7 @@ from benchmarks.report import Metrics
 from benchmarks.threshold import at_most, within
 from cogmap.cli.experiment.results import save_figure
 from cogmap.cli.progress import bar
-from cogmap.experiments.spiking.cells import Values
+from cogmap.estimation.spiking.cells import Values
 from cogmap.experiments.spiking.network import Border, Cues, Posterior, Recording, exact, record
 from cogmap.parallel import parallel_map
 from cogmap.services.codelets.public import rejection_mask

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from benchmarks.spiking.measure import SIDE_M
 from cogmap.cli.plots.palette import ESTIMATE, FAINT, INK, OBJECT, PAPER, TRUE
-from cogmap.experiments.spiking.cells import (
+from cogmap.estimation.spiking.cells import (
     GAMMA_S,
     SPACINGS_M,
     BorderCells,

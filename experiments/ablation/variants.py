@@ -16,6 +16,7 @@ PAPER = "paper"
 VARIANTS: dict[str, Rules] = {
     OURS: {},
     "localization_paper": {"localization": "paper"},
+    "localization_spiking": {"localization": "spiking"},
     "closes_by_sighting": {"closes_by": "sighting"},
     "correct_positions": {"correct": "positions"},
     "correct_eq9": {"correct": "eq9"},
@@ -25,6 +26,7 @@ VARIANTS: dict[str, Rules] = {
 LABELS = {
     OURS: "ours, whole",
     "localization_paper": "localization = paper",
+    "localization_spiking": "localization = spiking",
     "closes_by_sighting": "closes_by = sighting",
     "correct_positions": "correct = positions",
     "correct_eq9": "correct = eq9",

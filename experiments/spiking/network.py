@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cogmap.experiments.spiking.cells import (
+from cogmap.estimation.spiking.cells import (
     GAMMA_S,
     SPACINGS_M,
     BorderCells,

@@ -1,5 +1,6 @@
 """The rules by which an agent localizes, closes loops, corrects its map and plans: which settings
-they are, and presets of them. `paper` has those of Madl et al. (2016) as printed, `cogmap` ours.
+they are, and presets of them. `paper` has those of Madl et al. (2016) as printed, `cogmap` ours,
+and `spiking` ours with localization by spikes.
 """
 
 from __future__ import annotations
@@ -18,6 +19,12 @@ RULES = {
 """The section of each rule's setting."""
 
 OURS = "cogmap"
+_OURS = {
+    "localization": "cogmap",
+    "closes_by": "agreement",
+    "correct": "heading",
+    "planning": "hierarchy",
+}
 PRESETS: dict[str, dict[str, str]] = {
     "paper": {
         "localization": "paper",
@@ -25,12 +32,8 @@ PRESETS: dict[str, dict[str, str]] = {
         "correct": "eq9",
         "planning": "gradient",
     },
-    OURS: {
-        "localization": "cogmap",
-        "closes_by": "agreement",
-        "correct": "heading",
-        "planning": "hierarchy",
-    },
+    "spiking": _OURS | {"localization": "spiking"},
+    OURS: _OURS,
 }
 """`cogmap` has the defaults of the settings."""
 

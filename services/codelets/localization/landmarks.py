@@ -85,7 +85,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     A landmark that disagrees in MISSES views in a row, or in more than it ever agreed with, stands
     elsewhere: it starts anew from what is seen, once it is certain that the agent is not elsewhere.
     While the agent stands still and sees the same again, landmarks stay where they are; those that
-    were surveyed always do. By the paper's own rule every view counts, and none starts anew.
+    were surveyed always do. By the paper's own rule, and beside localization by spikes, every
+    view counts, and none starts anew.
     """
     agent = graph.agent
     if agent is None:
@@ -119,7 +120,7 @@ def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config:
     """Keep the positions of a landmark that agree with the view of `task`, and count in how many
     views it agreed, or in how many in a row it did not.
     """
-    if config.localization == "paper" and not landmark.surveyed:
+    if config.localization != "cogmap" and not landmark.surveyed:
         return _by_paper(landmark, percept, agent, task)
 
     is_same_view = is_seen_from_here(landmark, agent.stationary_since_ns)

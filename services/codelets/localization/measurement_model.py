@@ -53,6 +53,11 @@ class Measurements(NamedTuple):
     range_sd_m: Floats
     certainty: Floats
 
+    def select(self, number: int) -> Measurements:
+        """Return one landmark alone."""
+        chosen = slice(number, number + 1)
+        return Measurements._make(values[chosen] for values in self)
+
     @property
     def weights(self) -> Floats:
         """Return how much each counts for or against a pose that it fits or does not fit, (k,), 0

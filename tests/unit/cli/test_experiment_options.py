@@ -43,4 +43,4 @@ def test_rules_that_nobody_has_are_refused() -> None:
     done = CliRunner().invoke(experiment, ["--rules", "nobody"])
 
     assert done.exit_code == 2
-    assert "'nobody' is not one of 'paper', 'cogmap'" in done.output
+    assert "'nobody' is not one of 'paper', 'spiking', 'cogmap'" in done.output

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks.spiking import measure as spiking
-from cogmap.experiments.spiking.cells import (
+from cogmap.estimation.spiking.cells import (
     GAMMA_S,
     PEAK,
     BorderCells,

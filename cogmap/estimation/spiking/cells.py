@@ -52,18 +52,22 @@ class GridModule:
         """Return how much of its peak each cell fires at positions (n, 2): (cells, n), 1 in the
         middle of a field.
         """
-        centres_m = _pairs(np.arange(PHASES) / PHASES) @ self.lattice_m.T
-        own_rad = self._phases_rad(centres_m)
-        there_rad = self._phases_rad(where_m)
-        waves, cells = own_rad.shape
-        total = np.full((cells, len(where_m)), -waves, np.float32)
-
-        for own, there in zip(own_rad, there_rad, strict=True):
-            apart_rad = there - own[:, None]
-            total += np.cos(apart_rad)
+        phases = np.arange(PHASES) / PHASES
+        centres_m = pairs(phases, phases) @ self.lattice_m.T
+        own = self._waves(centres_m)
+        there = self._waves(where_m)
+        waves = len(own) // 2
+        total = own.T @ there - waves
 
         share = np.exp(SHARPNESS * total)
         return np.asarray(share, np.float32)
+
+    def _waves(self, where_m: Values) -> npt.NDArray[np.float32]:
+        """Return the cosines and sines (6, n) of the phases at positions (n, 2): the product of two
+        is the sum over the waves of the cosine of the phase between them.
+        """
+        phases_rad = self._phases_rad(where_m)
+        return np.vstack([np.cos(phases_rad), np.sin(phases_rad)])
 
     def _phases_rad(self, where_m: Values) -> npt.NDArray[np.float32]:
         """Return the phases (3, n) at positions (n, 2) of three waves, whose sum peaks in the
@@ -116,10 +120,10 @@ class BorderCells:
 def place_centres_m(side_m: float) -> Values:
     """Return where place cells have their fields in a square room: (n, 2), PLACE_M apart."""
     line_m = np.arange(PLACE_M / 2, side_m, PLACE_M)
-    return _pairs(line_m)
+    return pairs(line_m, line_m)
 
 
-def _pairs(values: Values) -> Values:
-    """Pair each of `values` (n,) with each, (n^2, 2)."""
-    first, second = np.meshgrid(values, values, indexing="ij")
+def pairs(first_values: Values, second_values: Values) -> Values:
+    """Pair each of the first (n,) values with each of the second (m,), (n m, 2)."""
+    first, second = np.meshgrid(first_values, second_values, indexing="ij")
     return np.column_stack([first.ravel(), second.ravel()])
