@@ -7,7 +7,7 @@ them has use for none.
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from functools import cache
 from importlib import import_module
 from importlib.metadata import entry_points
@@ -166,8 +166,12 @@ def prepare(name: str) -> Iterator[None]:
     yield
 
 
-def build(name: str, settings: config.Sections, instance: str = "") -> Module:
-    """Build module `name`, configured from its section. Raises UsageError, ConfigError."""
+def build(
+    name: str, settings: config.Sections, instance: str = "", only: Collection[str] = ()
+) -> Module:
+    """Build module `name`, configured from its section. Of the codelets it has `only` those, by
+    name, or all if none is named. Raises UsageError, ConfigError.
+    """
     if not settings.keys() <= {run.SECTION, *MODULES}:
         config.check_sections(settings, sections())
     if name not in ENTRIES:
@@ -176,7 +180,9 @@ def build(name: str, settings: config.Sections, instance: str = "") -> Module:
     def configured_codelets() -> tuple[ConfiguredCodelet, ...]:
         from cogmap.services.codelets.table import configured
 
-        return configured(settings, codelets())
+        found = codelets()
+        chosen = [codelet for codelet in found if not only or codelet.name in only]
+        return configured(settings, chosen)
 
     available: dict[str, Callable[[], Any]] = {
         "config": lambda: config.typed(settings, name, config_type(name)),

@@ -69,7 +69,7 @@ Examples:
 @click.option(
     "--fit",
     is_flag=True,
-    help="Fit the noise of self-motion and of landmarks first; otherwise it is near what fits.",
+    help="Fit the noise of self-motion and of landmarks first, from what was found so before.",
 )
 @common_options
 def cue_integration(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 from cogmap.runtime.module import Module
@@ -18,6 +19,16 @@ ROOM: dict[str, dict[str, Any]] = {
 }
 WORKER = "codelets-1"
 CYCLES_A_TRIAL = 1000
+# All that a response depends on: none of the others changes where the agent and the posts are.
+DECISIVE = (
+    "localization",
+    "object_place",
+    "landmark",
+    "path",
+    "loop_detection",
+    "map_correction",
+    "apply_correction",
+)
 
 
 def sections(rules: str) -> dict[str, dict[str, Any]]:
@@ -25,14 +36,15 @@ def sections(rules: str) -> dict[str, dict[str, Any]]:
     return with_rules(ROOM, rules)
 
 
-def modules(number: int, rules: str) -> list[Module]:
-    """Build workspace and one worker for trial `number`, by a preset of rules.
+def modules(number: int, rules: str, only: Collection[str] = ()) -> list[Module]:
+    """Build workspace and one worker for trial `number`, by a preset of rules, with `only` those
+    codelets, or all.
 
     Codelets draw their samples by the number of the cycle. Each trial has cycles of its own, as if
     others had gone before: otherwise chance would be the same in all.
     """
     configured = sections(rules)
-    workspace = registry.build("workspace", configured, "workspace")
+    workspace = registry.build("workspace", configured, "workspace", only)
     if number and workspace.restore is not None:
         workspace.restore(
             [
@@ -46,4 +58,4 @@ def modules(number: int, rules: str) -> list[Module]:
                 )
             ]
         )
-    return [workspace, registry.build("codelets", configured, WORKER)]
+    return [workspace, registry.build("codelets", configured, WORKER, only)]

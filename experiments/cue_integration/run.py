@@ -29,9 +29,9 @@ from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 from cogmap.services.codelets.rules import OURS
 
-# Chosen by hand near the values published of the conditions with one cue; `fitted` goes on from
-# there.
-FITTED = Noise(speed=0.25, turn=0.15, landmark=0.25)
+# What `fitted` found from 0.25, 0.15 and 0.25 on, with FIT_TRIALS trials of seed FIT_SEED + 1: the
+# nearest to what is published of self-motion alone and of landmarks alone.
+FITTED = Noise(speed=0.303, turn=0.136, landmark=0.227)
 COMPARED = (
     topics.SELF_MOTION,
     topics.PERCEPTS,

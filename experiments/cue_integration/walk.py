@@ -1,7 +1,8 @@
 """One walk to the posts, and a return from there in each condition: trials of one number differ
 only on the way back, so that what is the same in all is computed once.
 
-Messages are handed over as they are, without a bus: the same modules, in the same order.
+Messages are handed over as they are, without a bus, and only those codelets run that a response
+depends on: it is the same as with the bus and with all of them.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ class Walk:
     def __init__(self, trial: Trial) -> None:
         self._trial = trial
         self._room = room.Room(trial)
-        mind = agent.modules(trial.number, trial.rules)
+        mind = agent.modules(trial.number, trial.rules, agent.DECISIVE)
         self._modules: list[Module] = [*mind, participant.build(), room.build(self._room)]
 
         workspace, codelets = mind
