@@ -31,6 +31,10 @@ VERBS = {
         "cogmap.cli.experiment.route_planning:route_planning",
         "Experiment 3, figure 5: the order of several goals.",
     ),
+    "spiking": (
+        "cogmap.cli.experiment.spiking:spiking",
+        "Figure 4, step by step: spikes as samples along a walk.",
+    ),
 }
 _EPILOG = """\b
 Each leaves a folder with its figure as PNG and PDF, and a JSON file of every metric printed,

@@ -13,8 +13,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from cogmap.cli.plots.palette import (
+    CUT,
     ESTIMATE,
     FAINT,
+    FUSED,
     OBJECT,
     POSITIONS,
     ROAD,
@@ -24,14 +26,28 @@ from cogmap.cli.plots.palette import (
 from cogmap.cli.plots.sheet import describe, new_sheet
 from cogmap.experiments.loop_closing.observer import Loop, Map
 from cogmap.experiments.loop_closing.run import SENSING
+from cogmap.experiments.loop_closing.solvers import (
+    EQ9,
+    GAUSS_SEIDEL,
+    OVER_LOOPS,
+    REPLAY,
+    Solvers,
+)
 from cogmap.experiments.predictions.replayed import Replayed
 
 DASHED = (0, (4, 2))
+SOLVERS = {
+    GAUSS_SEIDEL: ("Gauss-Seidel, positions", FUSED),
+    OVER_LOOPS: ("Gauss-Seidel, loops", CUT),
+    EQ9: ("eq. 9 as printed", OBJECT),
+    REPLAY: ("reverse replay", POSITIONS),
+}
+LEAST_SHOWN_M = 1e-3
 
 
-def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
+def figure(loops: dict[str, Loop], solved: Solvers, metrics: dict[str, Any]) -> Figure:
     """Draw the sheet: the map before, right after, and in the end with headings; below, the first
-    replay.
+    replay, and how fast it solves the loop.
     """
     positions = loops["positions"]
     heading = loops["heading"]
@@ -50,9 +66,10 @@ def figure(loops: dict[str, Loop], metrics: dict[str, Any]) -> Figure:
             handles=_legend(), frameon=False, fontsize=8.5, ncols=5, loc="outside upper left"
         )
 
-        shifts, synapses = below.subplots(1, 2)
+        shifts, synapses, passes = below.subplots(1, 3)
         _draw_replay(shifts, positions.replays[0])
         _draw_synapses(synapses, positions.replays[0], metrics)
+        _draw_solvers(passes, solved)
     return sheet
 
 
@@ -117,7 +134,7 @@ def _draw_shifts(axes: Axes, before: Map, after: Map) -> None:
 def _draw_replay(axes: Axes, replay: Replayed) -> None:
     axes.plot(np.arange(len(replay.shifts_m)), replay.shifts_m, color=POSITIONS, lw=1.8)
     axes.set_ylim(bottom=0)
-    title = "d   shift of each place field, in the order of the replay"
+    title = "d   shift of each place field, in its replay's order"
     describe(axes, title, "places, from the one met again backwards", "shift, m")
 
 
@@ -131,10 +148,25 @@ def _draw_synapses(axes: Axes, replay: Replayed, metrics: dict[str, Any]) -> Non
     r = metrics["strength_and_shift_correlation_close_pairs"]
     axes.axline((0.0, 0.0), slope=slope, color=FAINT, lw=1.0, ls=(0, (4, 2)))
     axes.plot(nearer, changes, ".", ms=5, color=POSITIONS, alpha=0.6)
-    title = f"e   predicted change of synapses, fields under {1 / replay.decay_per_m:g} m apart"
+    title = f"e   change of synapses, fields under {1 / replay.decay_per_m:g} m apart"
     describe(
         axes,
-        f"{title}: {slope:.3f} a metre, r = {r:.2f}",
+        f"{title}: {slope:.3f}/m, r = {r:.2f}",
         "by how much two place fields come nearer, m",
         f"change of exp(-{replay.decay_per_m:g} d)",
     )
+
+
+def _draw_solvers(axes: Axes, solved: Solvers) -> None:
+    """Plot how far the path is from that of the least cost, pass by pass."""
+    for name, (label, colour) in SOLVERS.items():
+        apart_m = solved.curves[name].from_solution_m
+        shown = np.flatnonzero(apart_m >= LEAST_SHOWN_M)
+        axes.plot(shown, apart_m[shown], ".-", ms=4, lw=1.4, color=colour, label=label)
+
+    axes.set_xscale("symlog", linthresh=1)
+    axes.set_xlim(left=0)
+    axes.set_yscale("log")
+    axes.legend(frameon=False, fontsize=8)
+    title = "f   the loop of b, from path integration alone"
+    describe(axes, title, "passes over the path", "from the least of eq. 7, m")

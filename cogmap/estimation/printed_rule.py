@@ -59,16 +59,25 @@ def precisions(loops: Loops, step_m2: Floats) -> Floats:
     return precision
 
 
-def replayed(positions_m: Floats, loops: Loops, rates: Floats) -> Floats:
-    """Replay (n, 2) positions once, backwards from the loop that closed last. `rates` (m,) are
-    alpha A.
+def rates(loops: Loops, step_m2: Floats) -> Floats:
+    """Return alpha A of each loop, (m,): alpha is LEARNING_RATE over the largest A. With more, a
+    loop would be closed beyond its end.
+    """
+    weights = precisions(loops, step_m2)
+    rate: Floats = LEARNING_RATE * weights / weights.max()
+    return rate
+
+
+def replayed(positions_m: Floats, loops: Loops, alpha_a: Floats) -> Floats:
+    """Replay (n, 2) positions once, backwards from the loop that closed last, by alpha A of each
+    loop, (m,).
     """
     after_m = positions_m.copy()
     for number in np.argsort(-loops.b, kind="stable").tolist():
         a = int(loops.a[number])
         b = int(loops.b[number])
         left_m = after_m[a] - after_m[b] - loops.offset_m[number]
-        after_m += rates[number] * np.outer(shares(len(after_m), a, b), left_m)
+        after_m += alpha_a[number] * np.outer(shares(len(after_m), a, b), left_m)
 
     return after_m
 
@@ -76,17 +85,14 @@ def replayed(positions_m: Floats, loops: Loops, rates: Floats) -> Floats:
 def close_loops(positions_m: Floats, loops: Loops, step_m2: Floats) -> tuple[Floats, int]:
     """Replay (n, 2) positions REPLAYS times; return them, and that number. Loops of fewer than two
     steps are ignored.
-
-    alpha is LEARNING_RATE over the largest A: with more, a loop would be closed beyond its end.
     """
     chosen = loops.select(loops.b - loops.a > 1)
     if not len(chosen.a):
         return positions_m, 0
 
-    weights = precisions(chosen, step_m2)
-    rates = LEARNING_RATE * weights / weights.max()
+    alpha_a = rates(chosen, step_m2)
     after_m = positions_m
     for _ in range(REPLAYS):
-        after_m = replayed(after_m, chosen, rates)
+        after_m = replayed(after_m, chosen, alpha_a)
 
     return after_m, REPLAYS

@@ -9,10 +9,12 @@ import numpy as np
 from cogmap.experiments.loop_closing.observer import Loop, rms_m
 from cogmap.experiments.loop_closing.rule import close_laps
 from cogmap.experiments.loop_closing.run import CORNERS_M, FRAME_HZ, NOISE, SPEED_M_S
+from cogmap.experiments.loop_closing.solvers import Solvers
 from cogmap.experiments.predictions.replayed import strength_fit
 from cogmap.services.sim.odometry import Noise
 
 LAPS = 1000
+PASSES = (0, 1, 10, 1000)
 ERRORS = ("path_error", "object_error", "end_error")
 Metrics = dict[str, float]
 
@@ -50,6 +52,24 @@ def loop_metrics(loops: Mapping[str, Loop]) -> Metrics:
     metrics["synapse_decay_per_m"] = replay.decay_per_m
     metrics |= strength_fit("close_pairs", replay, replay.close)
     return metrics | strength_fit("all_pairs", replay, np.ones_like(replay.close))
+
+
+def solver_metrics(solved: Solvers) -> dict[str, float | None]:
+    """Return for each solver of the first loop what is left after so many passes over the path: eq.
+    7 over its least, the distance from the path of the least cost, and the error of the path; and
+    after how many the cost is within one percent of the least, None if that is never.
+    """
+    metrics: dict[str, float | None] = {"solved_path_error_m": solved.least_path_error_m}
+    for name, curve in solved.curves.items():
+        metrics[f"{name}_solved_after_passes"] = curve.solved_after
+        for passes in PASSES:
+            if passes < len(curve.path_error_m):
+                after = f"after_{passes}_passes"
+                metrics[f"{name}_cost_over_least_{after}"] = float(curve.cost_over_least[passes])
+                metrics[f"{name}_from_solution_{after}_m"] = float(curve.from_solution_m[passes])
+                metrics[f"{name}_path_error_{after}_m"] = float(curve.path_error_m[passes])
+
+    return metrics
 
 
 def rule_metrics(seed: int) -> Metrics:

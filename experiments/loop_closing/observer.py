@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cogmap.errors import CogmapError
+from cogmap.estimation.pose_graph import PoseGraph
+from cogmap.estimation.reverse_replay import with_positions_only
 from cogmap.experiments import reading
 from cogmap.experiments.dead_reckoning import DeadReckoning
 from cogmap.experiments.predictions.replayed import Replayed
@@ -16,7 +18,11 @@ from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 from cogmap.schemas.cognition import Replay
 from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.nodes import LoopClosure
 from cogmap.schemas.sensing import TruePose
+from cogmap.services.codelets.mapping.path import steps_of
+from cogmap.services.codelets.mapping.views import constraints_of, views_of
+from cogmap.services.codelets.public import CodeletsConfig
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,9 @@ class Map:
 class Loop:
     """The map before the first correction was applied, right after it, and in the end.
 
+    `constraints` are those of the path before: its steps, and the closures that were accepted, for
+    positions alone.
+
     `fused_path_m` and `wheels_path_m` (n, 2) are the path in the end as self-motion alone and as
     the wheels alone would have it. They are the same where self-motion is the wheels'.
     """
@@ -63,6 +72,7 @@ class Loop:
     before: Map
     after: Map
     end: Map
+    constraints: PoseGraph
     fused_path_m: Floats
     wheels_path_m: Floats
     replays: list[Replayed]
@@ -71,13 +81,15 @@ class Loop:
 class Observer:
     """Follows the graph, the truth, the odometry and the replays of one drive."""
 
-    def __init__(self, landmarks: dict[str, tuple[float, float]]) -> None:
+    def __init__(self, landmarks: dict[str, tuple[float, float]], config: CodeletsConfig) -> None:
         self._landmarks = landmarks
+        self._config = config
         self._graph = Graph()
         self._true: dict[int, tuple[float, float]] = {}
         self._wheels = DeadReckoning()
         self._replays: list[Replayed] = []
         self._before: Map | None = None
+        self._constraints: PoseGraph | None = None
         self._after: Map | None = None
 
     def module(self) -> Module:
@@ -92,7 +104,7 @@ class Observer:
 
     def loop(self) -> Loop:
         """Return what was observed. Raises CogmapError if no loop was closed."""
-        if self._before is None or self._after is None:
+        if self._before is None or self._after is None or self._constraints is None:
             raise CogmapError("no loop was closed on the path")
 
         rows = reading.path_rows(self._graph)
@@ -105,6 +117,7 @@ class Observer:
             before=self._before,
             after=self._after,
             end=self._map(),
+            constraints=self._constraints,
             fused_path_m=fused_path_m,
             wheels_path_m=wheels_path_m,
             replays=self._replays,
@@ -117,6 +130,7 @@ class Observer:
         corrects = delta.phase is Phase.CORRECTION and self._before is None
         if corrects:
             self._before = self._map()
+            self._constraints = self._pose_graph()
 
         if not self._graph.apply(delta):
             raise CogmapError(f"delta {delta.version} is not the next one")
@@ -132,6 +146,16 @@ class Observer:
     def on_replay(self, replay: Replay) -> None:
         """Keep a reverse replay."""
         self._replays.append(Replayed.of(replay))
+
+    def _pose_graph(self) -> PoseGraph:
+        """Return the path as it is now, and what constrains its positions."""
+        rows = reading.path_rows(self._graph)
+        closures = [each for each in self._graph.of_kind(LoopClosure) if each.accepted]
+        views = views_of([each for each in closures if not each.range_alone], rows)
+
+        poses = rows[:, reading.POSE]
+        steps = steps_of(rows, self._config)
+        return with_positions_only(PoseGraph(poses, steps, constraints_of(views, poses)))
 
     def _map(self) -> Map:
         """Return the map as it is now, with the true position at the stamp nearest to each."""

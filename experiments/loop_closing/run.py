@@ -15,6 +15,7 @@ from cogmap.parallel import Progress
 from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
 from cogmap.services import registry
+from cogmap.services.codelets.public import CodeletsConfig
 from cogmap.services.codelets.rules import OURS, positions_rule, with_rules
 from cogmap.services.sim.config import ODOMETRY_HZ
 from cogmap.services.sim.odometry import Noise
@@ -118,6 +119,7 @@ def driven(configured: Sections, modules: Sequence[Module]) -> Loop:
     for landmark in trajectory["landmarks"]:
         places_m[landmark["name"]] = (landmark["x_m"], landmark["y_m"])
 
-    observer = Observer(places_m)
+    config = msgspec.convert(configured.get("codelets", {}), CodeletsConfig)
+    observer = Observer(places_m, config)
     in_memory.run([*modules, observer.module()])
     return observer.loop()

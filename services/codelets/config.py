@@ -31,10 +31,10 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
             "their mean at each step (table 1), and are kept by the product of the likelihoods of "
             "all views (eq. 1-3), as each landmark's are by its own view (eq. 4); if none is left, "
             "those before the view stay. spiking: they are spikes of place cells that fire where "
-            "path integration by grid cells and a view of a landmark coincide, to which the grid "
-            "cells' phases are reset (figure 4); landmarks as with paper. cogmap: they continue "
-            "from themselves, in stages, a view counts by what is new in it, and a lost agent is "
-            "found again."
+            "path integration by grid cells and a view of a landmark coincide (figure 4); at each "
+            "step the phases of the grid cells are reset to their mean, and landmarks are as with "
+            "paper. cogmap: they continue from themselves, in stages, a view counts by what is new "
+            "in it, and a lost agent is found again."
         ),
     ] = "cogmap"
     samples: Annotated[

@@ -36,7 +36,7 @@ from cogmap.schemas.nodes import (
 from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.localization import cogmap_rule, paper_rule, spiking_rule
 from cogmap.services.codelets.localization.cogmap_rule import Localized, Step
-from cogmap.services.codelets.localization.measurement_model import Measurements, measurements
+from cogmap.services.codelets.localization.measurement_model import measurements
 from cogmap.services.codelets.localization.misfits import Estimate
 from cogmap.services.codelets.localization.motion_model import GAINS, dead_reckon
 from cogmap.services.codelets.localization.sampling import centred, generator
@@ -73,9 +73,9 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
         if stationary_since_ns == NEVER_NS:
             stationary_since_ns = max(0, agent.stamp_ns)
 
-    localized = _LOCALIZED[config.localization]
+    rule = cogmap_rule.localized if config.localization == "cogmap" else _from_mean
     step = Step(task, graph, agent, motions, variances, stationary_since_ns)
-    found, odometry, variances = localized(step, config, generator(task.task_id))
+    found, odometry, variances = rule(step, config, generator(task.task_id))
 
     after = msgspec.structs.replace(
         _self_node(task, agent, found),
@@ -104,47 +104,20 @@ CODELET = Codelet(
 )
 
 
-def _by_paper(step: Step, config: Config, rng: np.random.Generator) -> Localized:
-    """Localize as the paper prints it."""
-    samples = paper_rule.moved(step.agent.samples.numpy(), step.motions, config, rng)
-    seen = _all_in_view(step, config)
-    share = 1.0
-    if seen is not None:
-        samples, share = paper_rule.corrected(samples, seen, rng)
-
-    return _plain(step, samples, share)
-
-
-def _by_spikes(step: Step, config: Config, rng: np.random.Generator) -> Localized:
-    """Localize by spikes, as the paper's figure 4 has it."""
-    samples = spiking_rule.moved(step.agent.samples.numpy(), step.motions, config, rng)
-    seen = _all_in_view(step, config)
-    share = 1.0
-    if seen is not None:
-        samples, share = spiking_rule.corrected(samples, seen, rng)
-
-    return _plain(step, samples, share)
-
-
-def _all_in_view(step: Step, config: Config) -> Measurements | None:
-    """Measure every landmark in view, from its first sighting on, and from where the agent stands
-    too.
+def _from_mean(step: Step, config: Config, rng: np.random.Generator) -> Localized:
+    """Localize as the paper has it, by rejection or by spikes: every landmark in view counts, from
+    its first sighting on, and from where the agent stands too.
     """
-    limit_m = config.largest_landmark_sd_m
-    return measurements(step.task.percepts, step.graph, limit_m, NEVER_NS, 1)
+    agent = step.agent
+    samples = paper_rule.moved(agent.samples.numpy(), step.motions, config, rng)
+    seen = measurements(step.task.percepts, step.graph, config.largest_landmark_sd_m, NEVER_NS, 1)
+    share = 1.0
+    if seen is not None:
+        rule = spiking_rule if config.localization == "spiking" else paper_rule
+        samples, share = rule.corrected(samples, seen, rng)
 
-
-def _plain(step: Step, samples: Floats, share: float) -> Localized:
-    """Return the estimate of a rule that knows of no gains, and no agent that is lost."""
-    odometry = dead_reckon(step.agent.odometry.pose(), step.motions, NO_GAINS)
+    odometry = dead_reckon(agent.odometry.pose(), step.motions, NO_GAINS)
     return Localized(Estimate(samples, share), odometry, step.variances)
-
-
-_LOCALIZED = {
-    "paper": _by_paper,
-    "spiking": _by_spikes,
-    "cogmap": cogmap_rule.localized,
-}
 
 
 def _later(motions: Floats, duration_s: float) -> Floats:

@@ -1,10 +1,10 @@
 """Localization by spikes (paper §5.4, figure 4): pure functions of samples, which are the poses
 that grid cells and head-direction cells represent, one in each gamma cycle.
 
-Path integration moves their phases. Landmarks are attended to one after another: place cells fire
-where a landmark's vector cells coincide with path integration, and the phases of all cycles are
-reset to that firing, each to one spike. So the posterior of a step is the next one's prior, as in
-eq. 3; the paper's samples start from their mean. Without a landmark in view nothing resets them.
+They move as the paper's own samples do (`paper_rule.moved`), from one pose. Landmarks are attended
+to one after another: place cells fire where a landmark's vector cells coincide with path
+integration, and the phases of the cycles are reset to that firing, each to one spike. Before the
+next step all are reset to one pose, the mean of the spikes, as in table 1.
 """
 
 from __future__ import annotations
@@ -14,23 +14,12 @@ import numpy as np
 from cogmap.estimation.spiking.coincidence import fire
 from cogmap.geometry.arrays import Floats, Singles
 from cogmap.schemas.nodes import POSE_COLUMNS
-from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.localization.measurement_model import Measurements, compare
-from cogmap.services.codelets.localization.motion_model import COLUMNS, GAINS, move
+from cogmap.services.codelets.localization.motion_model import GAINS
 from cogmap.services.codelets.localization.sampling import resample
 
 MIN_SPIKES = 10
 """Fewer spikes reset nothing: a handful would be all that is left of the distribution."""
-
-
-def moved(samples: Floats, motions: Floats, config: Config, rng: np.random.Generator) -> Floats:
-    """Move the phases of `config.samples` cycles (n, 7), without gains, by (m, 5) motions, from
-    those before, (k, 3) or more columns.
-    """
-    start = np.zeros((config.samples, COLUMNS))
-    start[:, :POSE_COLUMNS] = resample(samples[:, :POSE_COLUMNS], config.samples, 0.0, rng)
-
-    return move(start, motions, Config(), rng)
 
 
 def corrected(

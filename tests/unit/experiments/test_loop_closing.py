@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
-from cogmap.experiments.loop_closing.metrics import loop_metrics
+from cogmap.estimation.pose_graph import Constraints, PoseGraph, diagonal_information
+from cogmap.experiments.loop_closing.metrics import loop_metrics, solver_metrics
 from cogmap.experiments.loop_closing.observer import Loop, Map
 from cogmap.experiments.loop_closing.rule import close_laps
 from cogmap.experiments.loop_closing.run import CORNERS_M, METHODS, trajectory
+from cogmap.experiments.loop_closing.solvers import Solvers, solvers
 from cogmap.experiments.predictions.replayed import Replayed
 from cogmap.schemas.array import Array
 from cogmap.schemas.cognition import Replay
@@ -62,14 +65,32 @@ def _squeezed() -> Replayed:
 
 
 def _loop(error_m: float) -> Loop:
-    there = np.zeros((5, 2))
+    there = np.zeros((17, 2))
     ahead = there + np.array([error_m, 0.0])
     aside = there + np.array([0.0, error_m])
     wheels_m = there + np.array([2 * error_m, 0.0])
 
     off = Map(ahead, there, aside, there, there)
     exact = Map(there, there, there, there, there)
-    return Loop(off, exact, off, there, wheels_m, [_squeezed()])
+    return Loop(off, exact, off, _square(), there, wheels_m, [_squeezed()])
+
+
+def _square() -> PoseGraph:
+    """Once round a square of 10 m in steps of 2.5 m, each measured 0.1 m too far east, and the end
+    seen to be where the start is.
+    """
+    ahead = np.repeat([(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)], 4, axis=0)
+    true_m = np.vstack([[0.0, 0.0], np.cumsum(2.5 * ahead, axis=0)])
+    steps_m = np.diff(true_m, axis=0) + np.array([0.1, 0.0])
+    poses = np.column_stack([true_m, np.zeros(17)])
+    measured = np.column_stack([steps_m, np.zeros(16)])
+
+    weak = diagonal_information(np.full(16, 1.0), np.full(16, 1e4))
+    strong = diagonal_information(np.array([100.0]), np.array([1e4]))
+    numbers = np.arange(16)
+    steps = Constraints(numbers, numbers + 1, measured, weak)
+    closure = Constraints(np.array([0]), np.array([16]), np.zeros((1, 3)), strong)
+    return PoseGraph(poses, steps, closure)
 
 
 def _metrics(error_m: float) -> dict[str, float]:
@@ -109,7 +130,7 @@ def test_errors_are_measured_before_and_after_correction_and_in_the_end() -> Non
 
 
 def test_the_path_is_compared_with_fused_self_motion_alone() -> None:
-    drifting_m = np.zeros((5, 2)) + np.array([0.0, 12.0])
+    drifting_m = np.zeros((17, 2)) + np.array([0.0, 12.0])
     loops = {method: replace(_loop(3.0), fused_path_m=drifting_m) for method in METHODS}
 
     metrics = loop_metrics(loops)
@@ -154,3 +175,35 @@ def test_the_trajectory_ends_on_the_street_where_it_began() -> None:
     assert back == start
     assert end_y_m == start[1]
     assert 0 < end_x_m < corner[0]
+
+
+@cache
+def _solved() -> Solvers:
+    return solvers(_loop(3.0))
+
+
+def test_every_solver_begins_with_path_integration_and_none_passes_the_least() -> None:
+    curves = _solved().curves
+
+    for curve in curves.values():
+        assert curve.from_solution_m[0] == pytest.approx(curves["eq9"].from_solution_m[0])
+        assert curve.cost_over_least.min() >= 1 - 1e-9
+
+
+def test_one_reverse_replay_solves_one_loop_and_gauss_seidel_takes_many() -> None:
+    """Of equal steps, and a closure a hundred times as certain, the end moves by 1600 / 1601."""
+    metrics = solver_metrics(_solved())
+
+    assert metrics["reverse_replay_solved_after_passes"] == 1
+    assert metrics["gauss_seidel_over_loops_solved_after_passes"] == 1
+    assert metrics["reverse_replay_from_solution_after_1_passes_m"] == pytest.approx(0.0, abs=1e-9)
+    assert metrics["gauss_seidel_solved_after_passes"] > 40
+    assert metrics["gauss_seidel_from_solution_after_1000_passes_m"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_eq_9_as_printed_halves_the_discrepancy_at_each_replay() -> None:
+    left_m = _solved().curves["eq9"].from_solution_m
+
+    # All of it, 1.6 m at the end: the printed shares begin one step late.
+    assert left_m[1] / left_m[0] == pytest.approx(0.5, abs=0.05)
+    assert left_m[2] / left_m[0] == pytest.approx(0.25, abs=0.06)

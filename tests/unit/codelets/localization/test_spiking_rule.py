@@ -15,12 +15,11 @@ CONFIG = Config(localization="spiking", samples=4000)
 AHEAD = ((5.5, 0.0, 1.0, 0.5, 0.0),)
 
 
-def test_phases_go_on_from_where_the_place_cells_fired() -> None:
+def test_phases_are_reset_to_the_mean_of_the_spikes_at_each_step() -> None:
     apart = agent([(0.0, 0.0, 0.0)] * 100 + [(2.0, 0.0, 0.0)] * 100)
     found = localized(apart, config=CONFIG, motions=motions((3.0, 0.0, 1.0, 0.0, 0.0)))
 
-    assert np.unique(samples_of(found)[:, 0]) == pytest.approx((3.0, 5.0))
-    assert found.x_m == pytest.approx(4.0)
+    assert samples_of(found) == pytest.approx(np.tile((4.0, 0.0, 0.0), (4000, 1)))
 
 
 def test_the_spikes_are_the_posterior_of_eq_3() -> None:
