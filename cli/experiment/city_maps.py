@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from cogmap.experiments.city_maps import people
 from cogmap.experiments.city_maps.drive import MODULES
 from cogmap.experiments.city_maps.environment import City, Environment, environments
 from cogmap.experiments.city_maps.fit import Fit, fitted, halves
+from cogmap.experiments.city_maps.kept import SUFFIX
 from cogmap.experiments.city_maps.measure import (
     MAPS,
     NOISE,
@@ -40,7 +42,7 @@ Examples:
   cogmap experiment city-maps --all extracts          every extract in a folder, against people
   cogmap experiment city-maps --maps 4 --human examples/human_maps.csv
 """
-TRAVERSALS_OF_ALL = 2
+TRAVERSALS_OF_ALL = 1
 
 
 @click.command(name=NAME, epilog=_EPILOG)
@@ -132,8 +134,9 @@ def city_maps(
         chosen = fits["view"].noise
 
     often = traversals or (TRAVERSALS if all_in is None else TRAVERSALS_OF_ALL)
+    kept = _kept(out)
     with bar("traversals") as progress:
-        budget = Budget(often, common.seed, common.processes, progress, common.rules)
+        budget = Budget(often, common.seed, common.processes, progress, common.rules, kept)
         found = measure(places, chosen, budget)
 
     metrics = map_metrics(found, chosen) | rules
@@ -154,7 +157,23 @@ def city_maps(
 
     results.show(NAME, metrics)
     _save(out, found, metrics, common)
+    shutil.rmtree(kept)
     live.check(differing)
+
+
+def _kept(out: Path) -> Path:
+    """Make the folder that traversals are kept in until the command ends, and print whether some
+    are there.
+    """
+    kept = out / "traversals"
+    kept.mkdir(exist_ok=True)
+    count = len(list(kept.glob(f"*{SUFFIX}")))
+    if count:
+        click.echo(
+            f"continues with {count} traversals of an interrupted run, from {kept}", err=True
+        )
+
+    return kept
 
 
 def _save(out: Path, found: list[CityMap], metrics: dict[str, float | str], common: Common) -> None:

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from cogmap.estimation.alignment import similar_to
 from cogmap.experiments import rendered
 from cogmap.experiments.city_maps.correction import METHODS
-from cogmap.experiments.city_maps.drive import COGNITION, Tour, driven, sections, traverse
+from cogmap.experiments.city_maps.drive import COGNITION, Tour, driven, sections
 from cogmap.experiments.city_maps.environment import BUILDINGS, Environment
+from cogmap.experiments.city_maps.kept import traverse_once
 from cogmap.experiments.city_maps.observer import Traversal
 from cogmap.experiments.city_maps.streets import Points
 from cogmap.parallel import Progress, parallel_map
@@ -37,8 +39,8 @@ class Job:
 
 @dataclass(frozen=True)
 class Budget:
-    """How often each environment is traversed, from which seed, on how many processes, and by which
-    preset of rules.
+    """How often each environment is traversed, from which seed, on how many processes, by which
+    preset of rules, and in which folder traversals are kept as they end, if any.
     """
 
     traversals: int
@@ -46,6 +48,19 @@ class Budget:
     processes: int
     progress: Progress = lambda share: None
     rules: str = OURS
+    kept: Path | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Drive:
+    """A traversal by one method of correction, and the folder that it is kept in, if any."""
+
+    configured: Sections
+    kept: Path | None
+
+    def traversed(self) -> Traversal:
+        """Drive it, unless it is kept already."""
+        return traverse_once(self.configured, self.kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +112,25 @@ class CityMap:
 def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
     """Measure all environments: the same seed gives the same, whatever the number of processes."""
     every = jobs(environments, noise, budget.traversals, budget.seed, budget.rules)
-    learned = parallel_map(traversed, every, budget.processes, budget.progress)
+    drives = [
+        Drive(configured, budget.kept)
+        for job in every
+        for configured in configurations(job).values()
+    ]
+    traversals = parallel_map(Drive.traversed, drives, budget.processes, budget.progress)
+
+    learned = []
+    for number, job in enumerate(every):
+        first = number * len(METHODS)
+        own = traversals[first : first + len(METHODS)]
+        learned.append(_learned(job, dict(zip(METHODS, own, strict=True))))
+
     maps = []
 
     for place, environment in enumerate(environments):
         first = place * budget.traversals
-        own = learned[first : first + budget.traversals]
-        city = CityMap(environment, tuple(own))
+        of_map = learned[first : first + budget.traversals]
+        city = CityMap(environment, tuple(of_map))
         maps.append(city)
 
     return maps
@@ -127,28 +154,17 @@ def jobs(
     return found
 
 
-def traversed(job: Job) -> Learned:
-    """Drive one tour from a building and in a direction drawn from the seed.
-
-    Each method gets the same noise.
-    """
-    maps = {}
-
-    for method, configured in configurations(job).items():
-        maps[method] = traverse(configured)
-
-    return _learned(job, maps)
-
-
 def by_cameras(job: Job, progress: Progress) -> Learned:
-    """Drive as `traversed` does, with buildings that are drawn and recognised."""
+    """Drive a traversal by each method with buildings that are drawn and recognised."""
     configured = configurations(job)
     maps = rendered.by_cameras(configured, COGNITION, driven, progress)
     return _learned(job, maps)
 
 
 def configurations(job: Job) -> dict[str, Sections]:
-    """Return the configuration of every module for the tour of `job`, by each method."""
+    """Return the configuration of every module for the tour of `job`, by each method, from a
+    building and in a direction drawn from the seed. Each method gets the same noise.
+    """
     rng = np.random.default_rng([job.seed, 0xCAFE, job.number])
     tour = Tour(
         start=int(rng.integers(BUILDINGS)),

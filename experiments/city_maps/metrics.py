@@ -89,30 +89,23 @@ def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
 
 def fit_metrics(maps: Sequence[CityMap], fits: Mapping[str, Fit], fitted_maps: int) -> Metrics:
     """Return how the errors of the `maps` that the noise was not fitted to compare with people's:
-    ratios of mean errors.
+    ratios of mean errors, with standard errors `_se`.
 
     `paper` is of agents whose positions alone are corrected, `ours` of those whose headings are
     too. `rule` is of the paper's rule without any percept, by which the noise was fitted: drawn
     anew each `view`, as the agents have it, or alike for all views of a `leg`.
     """
-    paper_km2, ours_km2, paper_aligned_km2, ours_aligned_km2 = np.mean(
-        [
-            (
-                city.error_km2(POSITIONS),
-                city.error_km2(HEADING),
-                city.aligned_error_km2(POSITIONS),
-                city.aligned_error_km2(HEADING),
-            )
-            for city in maps
-        ],
-        axis=0,
-    ).tolist()
     people_km2 = published.HUMAN_MEAN_KM2
+    people = np.full(len(maps), people_km2)
+    paper_km2 = np.array([city.error_km2(POSITIONS) for city in maps])
+    ours_km2 = np.array([city.error_km2(HEADING) for city in maps])
+    paper_aligned_km2 = np.array([city.aligned_error_km2(POSITIONS) for city in maps])
+    ours_aligned_km2 = np.array([city.aligned_error_km2(HEADING) for city in maps])
     metrics: Metrics = {
-        "paper_over_people": paper_km2 / people_km2,
-        "ours_over_paper": ours_km2 / paper_km2,
-        "paper_aligned_over_people": paper_aligned_km2 / people_km2,
-        "ours_aligned_over_paper_aligned": ours_aligned_km2 / paper_aligned_km2,
+        **_ratio("paper_over_people", paper_km2, people),
+        **_ratio("ours_over_paper", ours_km2, paper_km2),
+        **_ratio("paper_aligned_over_people", paper_aligned_km2, people),
+        **_ratio("ours_aligned_over_paper_aligned", ours_aligned_km2, paper_aligned_km2),
         "split": "by name: the first, third and so on fitted to, the others tested",
         "maps_fitted": float(fitted_maps),
         "maps_tested": float(len(maps)),
@@ -127,6 +120,17 @@ def fit_metrics(maps: Sequence[CityMap], fits: Mapping[str, Fit], fitted_maps: i
         }
 
     return metrics
+
+
+def _ratio(name: str, above: Errors, below: Errors) -> Metrics:
+    """Return the ratio of two means over the maps, and its standard error `_se`, by how much the
+    maps differ, to first order; 0 for one map.
+    """
+    mean = float(below.mean())
+    ratio = float(above.mean()) / mean
+    residual = above - ratio * below
+    spread = float(residual.std(ddof=1)) if len(above) > 1 else 0.0
+    return {name: ratio, f"{name}_se": spread / mean / len(above) ** 0.5}
 
 
 def camera_metrics(drawn: Learned, percepts: Learned) -> Metrics:

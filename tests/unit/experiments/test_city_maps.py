@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cogmap.errors import CogmapError, UsageError
+from cogmap.experiments.city_maps import drive
 from cogmap.experiments.city_maps.correction import settings
 from cogmap.experiments.city_maps.drive import Tour, sections, traverse
 from cogmap.experiments.city_maps.environment import (
@@ -21,6 +22,7 @@ from cogmap.experiments.city_maps.environment import (
     environments,
 )
 from cogmap.experiments.city_maps.fit import Fit, fitted, halves
+from cogmap.experiments.city_maps.kept import traverse_once
 from cogmap.experiments.city_maps.measure import (
     NOISE,
     CityMap,
@@ -33,6 +35,7 @@ from cogmap.experiments.city_maps.observer import WHEELS
 from cogmap.experiments.city_maps.sources import from_osm, grown, plane_m
 from cogmap.experiments.city_maps.streets import Streets, shortest_path
 from cogmap.experiments.city_maps.tour import shortest_tour
+from cogmap.runtime.config import Sections
 from cogmap.services.sim.odometry import Noise
 from tests.support.paths import steps_m
 
@@ -248,22 +251,62 @@ def test_the_model_is_compared_with_people_on_tested_maps_by_mean_errors() -> No
 
     assert found["paper_over_people"] == pytest.approx(2.0)
     assert found["ours_over_paper"] == pytest.approx(0.1)
+    assert found["ours_over_paper_se"] == pytest.approx(0.0)
     assert found["rule_by_view_over_people"] == pytest.approx(0.5)
     assert found["maps_fitted"] == 3
     assert found["maps_tested"] == 1
+
+
+def test_the_ratio_of_means_is_as_uncertain_as_the_maps_differ() -> None:
+    environment = _environment(1)
+    fit = Fit(NOISE, fitted_km2=1.07, tested_km2=1.07)
+    nothing = {WHEELS: 1.0, "none": 1.0}
+    maps = [
+        _map(environment, nothing | {"positions": paper, "heading": ours})
+        for paper, ours in ((2.0, 0.0), (2.0, 1.0))
+    ]
+
+    found = fit_metrics(maps, {"view": fit}, 2)
+
+    assert found["ours_over_paper"] == pytest.approx(0.25)
+    assert found["ours_over_paper_se"] == pytest.approx(0.25)
+    assert found["paper_over_people_se"] == pytest.approx(0.0)
 
 
 def _named(environment: Environment, name: str) -> Environment:
     return replace(environment, name=name)
 
 
-def test_without_noise_and_confusions_the_map_is_right_and_repeatable() -> None:
-    environment = _environment(7)
+def _beginning_of_a_tour(environment: Environment, points: int) -> Sections:
+    """The configuration of a drive without noise and confusions along so many of its points."""
     quiet = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
     configured = sections(environment, Tour(start=0, backward=True, seed=1), quiet, "none")
     simulated = configured["sim"]
-    simulated["trajectory"]["line_m"] = simulated["trajectory"]["line_m"][:12]
+    simulated["trajectory"]["line_m"] = simulated["trajectory"]["line_m"][:points]
     simulated["percepts"] |= {"right_name": 1.0, "precision": 1.0, "place_precision": 1.0}
+    return configured
+
+
+def test_a_traversal_that_is_kept_is_not_driven_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    configured = _beginning_of_a_tour(_environment(7), 2)
+    driven = traverse_once(configured, tmp_path)
+
+    # A module that there is not: a drive would fail.
+    monkeypatch.setattr(drive, "MODULES", ("nothing",))
+    kept = traverse_once(configured, tmp_path)
+
+    for name, value in asdict(driven).items():
+        np.testing.assert_equal(getattr(kept, name), value)
+    other = configured | {"workspace": configured["workspace"] | {"cell_m": 4.0}}
+    with pytest.raises(UsageError, match="no module"):
+        traverse_once(other, tmp_path)
+
+
+def test_without_noise_and_confusions_the_map_is_right_and_repeatable() -> None:
+    environment = _environment(7)
+    configured = _beginning_of_a_tour(environment, 12)
 
     made = traverse(configured)
     again = traverse(configured)

@@ -1,0 +1,62 @@
+"""Traversals kept in files as they end, so that an interrupted experiment continues."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from cogmap.experiments.city_maps.drive import traverse
+from cogmap.experiments.city_maps.observer import Traversal
+from cogmap.runtime.config import Sections
+from cogmap.version import VERSION
+
+SUFFIX = ".npz"
+ALONE = "alone:"
+
+
+def traverse_once(configured: Sections, folder: Path | None) -> Traversal:
+    """Drive as `traverse` does, unless a file in `folder` has that traversal, and keep it there;
+    without a folder nothing is kept.
+    """
+    if folder is None:
+        return traverse(configured)
+
+    path = folder / f"{_digest(configured)}{SUFFIX}"
+    if path.exists():
+        return _read(path)
+
+    found = traverse(configured)
+    _write(path, found)
+    return found
+
+
+def _digest(configured: Sections) -> str:
+    """Return a name for all that a traversal depends on, but the code of this version."""
+    text = msgspec.json.encode([VERSION, configured], order="deterministic")
+    return hashlib.sha256(text).hexdigest()
+
+
+def _write(path: Path, found: Traversal) -> None:
+    """Write a traversal, so that a file is whole or is not there."""
+    columns: dict[str, Any] = asdict(found)
+    for name, alone_m in columns.pop("alone_m").items():
+        columns[ALONE + name] = alone_m
+
+    partial = path.with_suffix(".partial")
+    with partial.open("wb") as file:
+        np.savez(file, allow_pickle=False, **columns)
+    partial.replace(path)
+
+
+def _read(path: Path) -> Traversal:
+    with np.load(path) as columns:
+        arrays = {name: columns[name] for name in columns.files}
+
+    alone = [name for name in arrays if name.startswith(ALONE)]
+    alone_m = {name.removeprefix(ALONE): arrays.pop(name) for name in alone}
+    return Traversal(alone_m=alone_m, **arrays)
