@@ -14,7 +14,7 @@ from cogmap.cli.options import FiniteRange
 from cogmap.cli.progress import bar
 from cogmap.errors import UsageError
 from cogmap.experiments.city_maps import people
-from cogmap.experiments.city_maps.drive import MODULES
+from cogmap.experiments.city_maps.drive import LEG, MODULES, VIEW
 from cogmap.experiments.city_maps.environment import City, Environment, environments
 from cogmap.experiments.city_maps.fit import Fit, fitted, halves
 from cogmap.experiments.city_maps.kept import SUFFIX
@@ -33,6 +33,7 @@ from cogmap.experiments.city_maps.metrics import camera_metrics, fit_metrics, ma
 from cogmap.experiments.city_maps.sources import folder, from_osm, grown_environments
 from cogmap.parallel import Progress
 from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.trajectory import Drawn
 
 NAME = "city-maps"
 _EPILOG = """\b
@@ -40,6 +41,7 @@ Examples:
   cogmap experiment city-maps --json city.json        cities grown from a seed
   cogmap experiment city-maps --osm monaco.osm.xz --maps 4
   cogmap experiment city-maps --all extracts          every extract in a folder, against people
+  cogmap experiment city-maps --all extracts --noise-drawn leg
   cogmap experiment city-maps --maps 4 --human examples/human_maps.csv
 """
 TRAVERSALS_OF_ALL = 1
@@ -80,6 +82,14 @@ TRAVERSALS_OF_ALL = 1
     f"[default: {NOISE.speed} {NOISE.turn} {NOISE.drift_rad_per_sqrt_m}, fitted with --all]",
 )
 @click.option(
+    "--noise-drawn",
+    type=click.Choice([VIEW, LEG]),
+    default=VIEW,
+    show_default=True,
+    help="Draw its factors anew for each view, or alike for all views of a straight piece of a "
+    "street.",
+)
+@click.option(
     "--fit",
     is_flag=True,
     help="Fit that noise to the errors of people on every second map, by the paper's rule, and "
@@ -100,6 +110,7 @@ def city_maps(
     maps: int | None,
     traversals: int | None,
     noise: tuple[float, float, float] | None,
+    noise_drawn: Drawn,
     fit: bool,
     human: Path | None,
 ) -> None:
@@ -127,25 +138,27 @@ def city_maps(
     if people_km2 is not None:
         people.check_number(places, people_km2)  # before hours of driving
 
-    fits: dict[str, Fit] = {}
+    fits: dict[Drawn, Fit] = {}
     if to:
         with bar("fitting the noise") as progress:
             fits = fitted(to, places, common.seed, progress)
-        chosen = fits["view"].noise
+        chosen = fits[noise_drawn].noise
 
     often = traversals or (TRAVERSALS if all_in is None else TRAVERSALS_OF_ALL)
     kept = _kept(out)
     with bar("traversals") as progress:
-        budget = Budget(often, common.seed, common.processes, progress, common.rules, kept)
+        budget = Budget(
+            often, common.seed, common.processes, progress, common.rules, kept, noise_drawn
+        )
         found = measure(places, chosen, budget)
 
-    metrics = map_metrics(found, chosen) | rules
+    metrics = map_metrics(found, chosen) | rules | {"noise_drawn": noise_drawn}
     if fits:
         metrics |= fit_metrics(found, fits, len(to))
     if people_km2 is not None:
         metrics |= people.metrics(found, people_km2)
 
-    first = jobs(places, chosen, 1, common.seed, common.rules)[0]
+    first = jobs(places, chosen, 1, common.seed, common.rules, drawn=noise_drawn)[0]
     if common.cameras:
         with bar("with cameras") as progress:
             metrics |= camera_metrics(by_cameras(first, progress), found[0].learned[0])

@@ -18,10 +18,13 @@ from cogmap.runtime.module import Module
 from cogmap.services import registry
 from cogmap.services.codelets.rules import OURS
 from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.trajectory import Drawn
 
 COGNITION = ("workspace", "codelets", "global_workspace", "procedural", "action", "motor")
 MODULES = ("sim", *COGNITION)
 SENSING = "percept-level sensing"
+VIEW: Drawn = "view"
+LEG: Drawn = "leg"
 SPEED_M_S = 5.0
 FRAME_HZ = 1
 LEAD_M = 70.0
@@ -41,9 +44,17 @@ class Tour:
 
 
 def sections(
-    environment: Environment, tour: Tour, noise: Noise, method: str, rules: str = OURS
+    environment: Environment,
+    tour: Tour,
+    noise: Noise,
+    method: str,
+    rules: str = OURS,
+    *,
+    drawn: Drawn = VIEW,
 ) -> Sections:
-    """Return the configuration of every module for one traversal, as for `cogmap run --config`."""
+    """Return the configuration of every module for one traversal, as for `cogmap run --config`,
+    with factors of noise `drawn` anew for each view, or for each leg of the tour.
+    """
     correction = settings(method, SPEED_M_S / FRAME_HZ, rules)
     line_m = environment.line(tour.start, tour.backward, LEAD_M, OVERRUN_M)
     landmarks = [
@@ -58,6 +69,7 @@ def sections(
             "line_m": line_m.tolist(),
             "landmarks": landmarks,
             "speed_m_s": SPEED_M_S,
+            "noise_drawn": drawn,
         },
         "noise": msgspec.structs.asdict(noise),
         "percepts": {"field_of_view_rad": FIELD_OF_VIEW_RAD},

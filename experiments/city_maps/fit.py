@@ -12,11 +12,13 @@ from scipy.optimize import brentq
 
 from cogmap.errors import UsageError
 from cogmap.experiments.city_maps import published
+from cogmap.experiments.city_maps.drive import LEG, VIEW
 from cogmap.experiments.city_maps.environment import Environment
 from cogmap.experiments.city_maps.measure import NOISE
 from cogmap.experiments.city_maps.rule import VIEW_M, WHOLE_M, mean_error_km2, rule_tours
 from cogmap.parallel import Progress
 from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.trajectory import Drawn
 
 TOURS = 4
 LAPS = 25
@@ -53,7 +55,7 @@ def halves(environments: Sequence[Environment]) -> tuple[list[Environment], list
 
 def fitted(
     to: Sequence[Environment], others: Sequence[Environment], seed: int, progress: Progress
-) -> dict[str, Fit]:
+) -> dict[Drawn, Fit]:
     """Fit the noise by which the paper's rule errs on the maps `to` as people do: if factors are
     drawn anew each `view`, and if they are alike for all views of a `leg`.
 
@@ -63,7 +65,7 @@ def fitted(
     """
     by_view = _fitted(to, others, VIEW_M, seed + OTHERS, lambda share: progress(share / 2))
     by_leg = _fitted(to, others, WHOLE_M, seed + OTHERS, lambda share: progress((1 + share) / 2))
-    return {"view": by_view, "leg": by_leg}
+    return {VIEW: by_view, LEG: by_leg}
 
 
 def _fitted(

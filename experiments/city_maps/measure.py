@@ -11,7 +11,7 @@ import numpy as np
 from cogmap.estimation.alignment import similar_to
 from cogmap.experiments import rendered
 from cogmap.experiments.city_maps.correction import METHODS
-from cogmap.experiments.city_maps.drive import COGNITION, Tour, driven, sections
+from cogmap.experiments.city_maps.drive import COGNITION, VIEW, Tour, driven, sections
 from cogmap.experiments.city_maps.environment import BUILDINGS, Environment
 from cogmap.experiments.city_maps.kept import traverse_once
 from cogmap.experiments.city_maps.observer import Traversal
@@ -20,6 +20,7 @@ from cogmap.parallel import Progress, parallel_map
 from cogmap.runtime.config import Sections
 from cogmap.services.codelets.rules import OURS
 from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.trajectory import Drawn
 
 TRAVERSALS = 12
 MAPS = 8
@@ -28,19 +29,23 @@ NOISE = Noise(speed=0.1, turn=0.1, drift_rad_per_sqrt_m=0.0)
 
 @dataclass(frozen=True, eq=False)
 class Job:
-    """One traversal of one environment, by a preset of rules."""
+    """One traversal of one environment, by a preset of rules, with factors of noise that are
+    `drawn` anew for each view or leg.
+    """
 
     environment: Environment
     number: int
     noise: Noise
     seed: int
     rules: str = OURS
+    drawn: Drawn = VIEW
 
 
 @dataclass(frozen=True)
 class Budget:
     """How often each environment is traversed, from which seed, on how many processes, by which
-    preset of rules, and in which folder traversals are kept as they end, if any.
+    preset of rules, in which folder traversals are kept as they end, if any, and how often factors
+    of noise are `drawn` anew.
     """
 
     traversals: int
@@ -49,6 +54,7 @@ class Budget:
     progress: Progress = lambda share: None
     rules: str = OURS
     kept: Path | None = None
+    drawn: Drawn = VIEW
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +117,9 @@ class CityMap:
 
 def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
     """Measure all environments: the same seed gives the same, whatever the number of processes."""
-    every = jobs(environments, noise, budget.traversals, budget.seed, budget.rules)
+    every = jobs(
+        environments, noise, budget.traversals, budget.seed, budget.rules, drawn=budget.drawn
+    )
     drives = [
         Drive(configured, budget.kept)
         for job in every
@@ -142,6 +150,8 @@ def jobs(
     traversals: int,
     seed: int,
     rules: str = OURS,
+    *,
+    drawn: Drawn = VIEW,
 ) -> list[Job]:
     """Return all traversals of each environment, one environment after the other."""
     found = []
@@ -149,7 +159,7 @@ def jobs(
     for place, environment in enumerate(environments):
         own_seed = seed * 1000 + place
         for number in range(traversals):
-            found.append(Job(environment, number, noise, own_seed, rules))
+            found.append(Job(environment, number, noise, own_seed, rules, drawn))
 
     return found
 
@@ -174,7 +184,9 @@ def configurations(job: Job) -> dict[str, Sections]:
     found = {}
 
     for method in METHODS:
-        found[method] = sections(job.environment, tour, job.noise, method, job.rules)
+        found[method] = sections(
+            job.environment, tour, job.noise, method, job.rules, drawn=job.drawn
+        )
 
     return found
 

@@ -14,6 +14,7 @@ from cogmap.experiments.city_maps.fit import Fit
 from cogmap.experiments.city_maps.measure import CityMap, Learned
 from cogmap.experiments.city_maps.observer import FUSED, WHEELS
 from cogmap.services.sim.odometry import Noise
+from cogmap.services.sim.trajectory import Drawn
 
 # Of what was learned, how it is named: by wheels alone, without closing loops, by the paper's own
 # rule, and by ours, which corrects headings too.
@@ -87,13 +88,13 @@ def map_metrics(maps: Sequence[CityMap], noise: Noise) -> Metrics:
     return metrics
 
 
-def fit_metrics(maps: Sequence[CityMap], fits: Mapping[str, Fit], fitted_maps: int) -> Metrics:
+def fit_metrics(maps: Sequence[CityMap], fits: Mapping[Drawn, Fit], fitted_maps: int) -> Metrics:
     """Return how the errors of the `maps` that the noise was not fitted to compare with people's:
     ratios of mean errors, with standard errors `_se`.
 
     `paper` is of agents whose positions alone are corrected, `ours` of those whose headings are
     too. `rule` is of the paper's rule without any percept, by which the noise was fitted: drawn
-    anew each `view`, as the agents have it, or alike for all views of a `leg`.
+    anew each `view`, or alike for all views of a `leg`; `noise_drawn` is which the agents had.
     """
     people_km2 = published.HUMAN_MEAN_KM2
     people = np.full(len(maps), people_km2)

@@ -15,6 +15,7 @@ from cogmap.schemas.base import Coordinate, Name, PositiveMetres, PositiveSpeed
 from cogmap.schemas.sensing import Pose
 
 Leg = tuple[float, float]
+Drawn = Literal["view", "leg"]
 # Nearer than this, two points are one: above the rounding of coordinates.
 SAME_POINT_M = 1e-6
 
@@ -54,6 +55,13 @@ class Trajectory(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_field
     speed_m_s: Annotated[PositiveSpeed, msgspec.Meta(description="Speed of the robot, in m/s.")] = (
         5.0
     )
+    noise_drawn: Annotated[
+        Drawn,
+        msgspec.Meta(
+            description="How long the factors of noise stay. view: they are drawn anew for each "
+            "view. leg: they are alike until the line turns."
+        ),
+    ] = "view"
     sensing: Annotated[
         Literal["percepts", "cameras"],
         msgspec.Meta(

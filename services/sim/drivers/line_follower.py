@@ -31,6 +31,8 @@ class LineFollower:
         self._speed_m_s = trajectory.speed_m_s
         self._rest_ticks = rest_ticks
         self._noise = noise
+        self._is_drawn_by_leg = trajectory.noise_drawn == "leg"
+        self._factors: tuple[float, float, float] | None = None
         self._rng = np.random.default_rng([seed, 0x1ED])
 
     @property
@@ -73,10 +75,9 @@ class LineFollower:
         pace_s = dt_s / sum(length_m + TURN_AS_M * abs(turn_rad) for length_m, turn_rad in legs)
 
         noise = self._noise
-        deviations = (noise.speed, noise.turn, noise.drift_rad_per_sqrt_m)
         motions = []
         for length_m, turn_rad in legs:
-            speed, turn, drift = self._rng.normal((1.0, 1.0, 0.0), deviations).tolist()
+            speed, turn, drift = self._drawn()
             if length_m > ROUNDED_M:
                 duration_s = pace_s * length_m
                 felt_m = length_m * speed
@@ -97,5 +98,15 @@ class LineFollower:
                 felt_rad = turn_rad * turn
                 sd_rad_s = noise.turn * abs(felt_rad) / duration_s
                 motions.append(Motion(0.0, felt_rad / duration_s, duration_s, 0.0, sd_rad_s))
+                self._factors = None
 
         return motions
+
+    def _drawn(self) -> tuple[float, float, float]:
+        """Return the factors of speed and turn, and the drift: drawn anew, or those of the leg."""
+        if self._factors is None or not self._is_drawn_by_leg:
+            noise = self._noise
+            deviations = (noise.speed, noise.turn, noise.drift_rad_per_sqrt_m)
+            speed, turn, drift = self._rng.normal((1.0, 1.0, 0.0), deviations).tolist()
+            self._factors = (speed, turn, drift)
+        return self._factors

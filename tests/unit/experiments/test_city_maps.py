@@ -13,7 +13,7 @@ import pytest
 from cogmap.errors import CogmapError, UsageError
 from cogmap.experiments.city_maps import drive
 from cogmap.experiments.city_maps.correction import settings
-from cogmap.experiments.city_maps.drive import Tour, sections, traverse
+from cogmap.experiments.city_maps.drive import LEG, VIEW, Tour, sections, traverse
 from cogmap.experiments.city_maps.environment import (
     BUILDINGS,
     MAX_KM2,
@@ -28,6 +28,8 @@ from cogmap.experiments.city_maps.measure import (
     CityMap,
     Learned,
     aligned_error_km2,
+    configurations,
+    jobs,
     map_error_km2,
 )
 from cogmap.experiments.city_maps.metrics import fit_metrics, map_metrics
@@ -320,6 +322,17 @@ def test_without_noise_and_confusions_the_map_is_right_and_repeatable() -> None:
     assert known.any()
     assert np.hypot(*off_m.T).max() < 5.0
     assert np.hypot(*off_by_wheels_m.T).max() < 5.0
+
+
+def test_every_method_has_the_same_noise_drawn_by_view_or_by_leg() -> None:
+    (by_leg,) = jobs([_environment(1)], NOISE, 1, 1, drawn=LEG)
+    (by_view,) = jobs([_environment(1)], NOISE, 1, 1)
+
+    simulated = [each["sim"] for each in configurations(by_leg).values()]
+
+    assert simulated[0]["trajectory"]["noise_drawn"] == LEG
+    assert all(each == simulated[0] for each in simulated)
+    assert configurations(by_view)["none"]["sim"]["trajectory"]["noise_drawn"] == VIEW
 
 
 def test_loops_are_closed_only_where_that_is_asked_for() -> None:

@@ -16,7 +16,7 @@ from cogmap.services.sim.odometry import Noise
 from cogmap.services.sim.percept_level.percepts import PerceptErrors, PerceptSim
 from cogmap.services.sim.percept_level.places import PlaceSim
 from cogmap.services.sim.simulation import Simulation
-from cogmap.services.sim.trajectory import Landmark, Line, Trajectory
+from cogmap.services.sim.trajectory import Drawn, Landmark, Line, Trajectory
 from cogmap.testing import of_type
 
 SILENT = Noise(speed=0.0, turn=0.0, drift_rad_per_sqrt_m=0.0)
@@ -36,10 +36,15 @@ def _landmarks(number: int) -> list[Landmark]:
 
 
 def _simulation(
-    line=SQUARE, noise: Noise = SILENT, errors: PerceptErrors = EXACT, seed: int = 1
+    line=SQUARE,
+    noise: Noise = SILENT,
+    errors: PerceptErrors = EXACT,
+    seed: int = 1,
+    drawn: Drawn = "view",
 ) -> Simulation:
     config = Config(frame_hz=1, noise=noise, percepts=errors, seed=seed)
-    return scripted(config, Trajectory(line_m=line, landmarks=[HOUSE], speed_m_s=3.0))
+    trajectory = Trajectory(line_m=line, landmarks=[HOUSE], speed_m_s=3.0, noise_drawn=drawn)
+    return scripted(config, trajectory)
 
 
 def _ride(simulation: Simulation) -> list[tuple[TruePose, SelfMotion, Percepts]]:
@@ -69,6 +74,19 @@ def test_self_motion_without_noise_adds_up_to_the_true_path() -> None:
         assert x_m == pytest.approx(truth.pose.x_m, abs=1e-9)
         assert y_m == pytest.approx(truth.pose.y_m, abs=1e-9)
         assert turned_rad == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("drawn", "expected"), [("leg", 2), ("view", 20)])
+def test_noise_is_drawn_anew_for_each_view_or_for_each_leg(drawn: Drawn, expected: int) -> None:
+    noise = Noise(speed=0.1, turn=0.1, drift_rad_per_sqrt_m=0.0)
+    corner = [(0.0, 0.0), (30.0, 0.0), (30.0, 30.0)]
+    felt_m = []
+    for _, motion, _ in _ride(_simulation(line=corner, noise=noise, drawn=drawn)):
+        speed, _, dt, *_ = motion.motions.numpy()[0]
+        felt_m.append(round(speed * dt, 6))
+
+    assert len(felt_m) == 20
+    assert len(set(felt_m)) == expected
 
 
 def test_the_rows_of_a_view_take_as_long_as_the_view() -> None:
