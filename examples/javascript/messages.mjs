@@ -6,7 +6,10 @@ import { Decoder, Encoder } from "@msgpack/msgpack";
 export const SCAN = "sensory/scan";
 export const COMMAND = "motor/command";
 
-/** A number that travels as a float, whatever its value. */
+/**
+ * A number that travels as a float, whatever its value. It computes as a number does; but it is an
+ * object, so take Number(value) before === or a condition: even a Float of 0 is true.
+ */
 export class Float extends Number {}
 
 // The library has no option for this. Its version is pinned, and the golden messages test it.

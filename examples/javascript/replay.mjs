@@ -77,14 +77,17 @@ function difference(wanderer, command, recorded) {
   return inWords(command.payload, answers[0]);
 }
 
-/** Return the message that a cause names, of the newest process that had sent it by `sentNs`. */
+/**
+ * Return the message that a cause names: a source that was restarted numbers its messages anew, so
+ * of those the last one that was sent by `sentNs`, or the first if their clocks say that none was.
+ */
 function named([topic, source, number], sentNs, recorded) {
   const found = recorded.filter(({ envelope }) => {
     const isNamed = envelope.topic === topic && envelope.source === source;
-    return isNamed && envelope.seq === number && envelope.sent_ns <= sentNs;
+    return isNamed && envelope.seq === number;
   });
   found.sort((one, other) => (one.envelope.sent_ns < other.envelope.sent_ns ? -1 : 1));
-  return found.at(-1);
+  return found.findLast(({ envelope }) => envelope.sent_ns <= sentNs) ?? found[0];
 }
 
 /** Return the first field in which two messages differ, null if their bytes are the same. */

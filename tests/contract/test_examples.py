@@ -299,7 +299,7 @@ def test_the_tests_in_rust_pass() -> None:
 
 
 def test_the_tests_in_javascript_pass() -> None:
-    command = [_node(), "--test", "test/"]
+    command = [_node(), "--test"]
 
     run = subprocess.run(command, cwd=JAVASCRIPT, capture_output=True, text=True, check=False)
 

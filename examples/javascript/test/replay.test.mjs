@@ -47,6 +47,27 @@ test("an input that the log lacks is named", async () => {
   assert.equal(first, `motor/command number 7 of motor: ${lacks}`);
 });
 
+test("a restarted source's inputs are told apart by when they were sent", async () => {
+  const messages = await recorded();
+  const scans = messages.filter(({ envelope }) => envelope.topic === SCAN);
+  const lastNs = messages.at(-1).envelope.sent_ns;
+  for (const [number, { envelope }] of scans.entries()) {
+    const payload = scans[scans.length - 1 - number].payload;
+    messages.push({ envelope: { ...envelope, sent_ns: lastNs + 1n }, payload });
+  }
+
+  assert.equal(replay(messages).same, 60);
+});
+
+test("an input is found though the clock of its source is ahead", async () => {
+  const messages = await recorded();
+  for (const { envelope } of messages.filter(({ envelope }) => envelope.topic === SCAN)) {
+    envelope.sent_ns += 1_000_000_000n;
+  }
+
+  assert.equal(replay(messages).same, 60);
+});
+
 test("a log without commands is refused", () => {
   assert.throws(() => replay([]), /the log holds no motor\/command of motor/);
 });

@@ -24,8 +24,12 @@ fn configuration(endpoint: &str) -> zenoh::Result<Config> {
     Ok(config)
 }
 
-/// The command that answers a sample, and its envelope but for the times of this process.
-fn answer(wanderer: &mut Wanderer, sample: &Sample) -> Result<(MotorCommand, Envelope), String> {
+/// The command that answers a sample, and its envelope.
+fn answer(
+    wanderer: &mut Wanderer,
+    sample: &Sample,
+    incarnation: u64,
+) -> Result<(MotorCommand, Envelope), String> {
     let attachment = sample.attachment().ok_or("no envelope")?;
     let born_ns = born_ns(&attachment.to_bytes())?;
     let scan: RangeScan =
@@ -35,8 +39,8 @@ fn answer(wanderer: &mut Wanderer, sample: &Sample) -> Result<(MotorCommand, Env
     let envelope = Envelope {
         source: INSTANCE.into(),
         seq: command.seq,
-        incarnation: 0,
-        sent_ns: 0,
+        incarnation,
+        sent_ns: now_ns(),
         born_ns,
         stages: vec![],
         causes: vec![(SCAN.into(), scan.source, scan.seq)],
@@ -60,7 +64,7 @@ fn run(endpoint: &str, agent: &str) -> Result<(), Box<dyn Error + Send + Sync>> 
 
     let mut wanderer = Wanderer::new(0);
     while let Ok(sample) = scans.recv() {
-        let (command, envelope) = match answer(&mut wanderer, &sample) {
+        let (command, envelope) = match answer(&mut wanderer, &sample, incarnation) {
             Ok(answer) => answer,
             Err(reason) => {
                 eprintln!("wanderer: a scan is ignored: {reason}");
@@ -68,11 +72,6 @@ fn run(endpoint: &str, agent: &str) -> Result<(), Box<dyn Error + Send + Sync>> 
             }
         };
 
-        let envelope = Envelope {
-            incarnation,
-            sent_ns: now_ns(),
-            ..envelope
-        };
         commands
             .put(encode(&command))
             .attachment(rmp_serde::to_vec(&envelope)?)

@@ -13,7 +13,7 @@ const ENVELOPES: &str = "_envelope";
 
 /// The envelope of a message as a log holds it, on a channel of its own. It has the log time and
 /// the sequence of its message.
-#[derive(Deserialize)]
+#[derive(Clone, Deserialize)]
 pub struct Envelope {
     pub topic: String,
     pub source: String,
@@ -24,6 +24,7 @@ pub struct Envelope {
 }
 
 /// A message in a log, as it travelled.
+#[derive(Clone)]
 pub struct Recorded {
     pub envelope: Envelope,
     pub payload: Vec<u8>,
@@ -126,17 +127,22 @@ fn difference(
     }
 }
 
-/// The message that a cause names, of the newest process that had sent it by `sent_ns`.
+/// The message that a cause names. A source that was restarted numbers its messages anew: of those
+/// it is the last one that was sent by `sent_ns`, or the first if their clocks say that none was.
 fn input<'a>(cause: &Cause, sent_ns: u64, recorded: &'a [Recorded]) -> Option<&'a [u8]> {
     let (topic, source, number) = cause;
-    recorded
+    let mut found: Vec<&Recorded> = recorded
         .iter()
         .filter(|Recorded { envelope, .. }| {
             let is_named = envelope.topic == *topic && envelope.source == *source;
-            is_named && envelope.seq == *number && envelope.sent_ns <= sent_ns
+            is_named && envelope.seq == *number
         })
-        .max_by_key(|each| each.envelope.sent_ns)
-        .map(|each| each.payload.as_slice())
+        .collect();
+    found.sort_by_key(|each| each.envelope.sent_ns);
+
+    let last = found.iter().rfind(|each| each.envelope.sent_ns <= sent_ns);
+    let chosen = last.or(found.first())?;
+    Some(&chosen.payload)
 }
 
 /// The first field in which two messages differ, None if their bytes are the same.

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use wanderer::messages::COMMAND;
+use wanderer::messages::{COMMAND, SCAN};
 use wanderer::replay::{read, replay, Recorded};
 
 fn recorded() -> Vec<Recorded> {
@@ -48,6 +48,37 @@ fn an_input_that_the_log_lacks_is_named() {
 
     let lacks = "the log lacks sensory/scan number 1000 of sensory, which led to it";
     assert_eq!(first, format!("motor/command number 7 of motor: {lacks}"));
+}
+
+#[test]
+fn inputs_of_a_restarted_source_are_told_apart_by_when_they_were_sent() {
+    let mut recorded = recorded();
+    let last_ns = recorded.last().unwrap().envelope.sent_ns;
+    let mut scans: Vec<Recorded> = recorded
+        .iter()
+        .filter(|each| each.envelope.topic == SCAN)
+        .cloned()
+        .collect();
+    let payloads: Vec<Vec<u8>> = scans.iter().map(|each| each.payload.clone()).collect();
+    for (scan, payload) in scans.iter_mut().zip(payloads.into_iter().rev()) {
+        scan.envelope.sent_ns = last_ns + 1;
+        scan.payload = payload;
+    }
+    recorded.append(&mut scans);
+
+    assert_eq!(replay(&recorded).unwrap().same, 60);
+}
+
+#[test]
+fn an_input_is_found_though_the_clock_of_its_source_is_ahead() {
+    let mut recorded = recorded();
+    for each in &mut recorded {
+        if each.envelope.topic == SCAN {
+            each.envelope.sent_ns += 1_000_000_000;
+        }
+    }
+
+    assert_eq!(replay(&recorded).unwrap().same, 60);
 }
 
 #[test]
