@@ -25,7 +25,7 @@ from benchmarks.lifelong import measure as lifelong
 from benchmarks.localization import beacons, trees, without_names
 from benchmarks.localization import measure as localization
 from benchmarks.log_api import measure as log_api
-from benchmarks.map_correction import false_groups
+from benchmarks.map_correction import city_peer, false_groups
 from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
 from benchmarks.map_structure import measure as map_structure
@@ -131,6 +131,7 @@ SUITE = (
         },
         option_thresholds=false_groups.THRESHOLDS,
     ),
+    Benchmark("city_peer", {}, city_peer.measure, options=city_peer.OPTIONS),
     Benchmark("map_size", map_size.THRESHOLDS, map_size.measure),
     Benchmark("map_structure", map_structure.THRESHOLDS, map_structure.measure),
     Benchmark("place_grid", place_grid.THRESHOLDS, place_grid.measure),

@@ -30,7 +30,7 @@ def smooth(moments: Sequence[Moment]) -> Floats:
     for moment in moments:
         problem.add(moment)
 
-    return problem.solve()
+    return problem.poses(problem.solve())
 
 
 def smooth_online(moments: Sequence[Moment]) -> Floats:
@@ -56,11 +56,12 @@ def smooth_online(moments: Sequence[Moment]) -> Floats:
 class Problem:
     """A factor graph of the poses at the moments and of the landmarks seen.
 
-    Observations weigh by Cauchy's function, so that a landmark taken for another does not count for
-    much.
+    If it `is_robust`, observations weigh by Cauchy's function, so that a landmark taken for another
+    does not count for much.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, is_robust: bool = True) -> None:
+        self._is_robust = is_robust
         self._gtsam = optional.gtsam()
         self._graph = self._gtsam.NonlinearFactorGraph()
         self._start = self._gtsam.Values()
@@ -90,22 +91,38 @@ class Problem:
         self._start.insert(here, self._pose)
 
         for percept in moment.percepts:
-            models = self._gtsam.noiseModel
-            sds = np.array([percept.bearing_sd_rad, percept.range_sd_m])
-            cauchy = models.mEstimator.Cauchy.Create(CAUCHY)
-            robust = models.Robust.Create(cauchy, models.Diagonal.Sigmas(sds))
+            noise = self._observed((percept.bearing_sd_rad, percept.range_sd_m))
 
             _, _, number = percept.name.rpartition("-")
             landmark = self._gtsam.symbol("l", int(number))
             bearing = self._gtsam.Rot2(percept.bearing_rad)
             range_m = percept.range_m
-            seen = self._gtsam.BearingRangeFactor2D(here, landmark, bearing, range_m, robust)
+            seen = self._gtsam.BearingRangeFactor2D(here, landmark, bearing, range_m, noise)
             self._graph.add(seen)
 
             if landmark not in self._known:
                 self._known.add(landmark)
                 direction = np.array([np.cos(percept.bearing_rad), np.sin(percept.bearing_rad)])
                 self._start.insert(landmark, self._pose.transformFrom(range_m * direction))
+
+    def add_match(self, number: int, sds: Sequence[float]) -> None:
+        """Add that the newest pose is that of the pose `number`, from 1 on, with standard
+        deviations of x_m, y_m and heading_rad.
+        """
+        nowhere = self._gtsam.Pose2(0.0, 0.0, 0.0)
+        noise = self._observed(sds)
+        before = self._key(number)
+        self._graph.add(self._gtsam.BetweenFactorPose2(before, self.last, nowhere, noise))
+
+    def _observed(self, sds: Sequence[float]) -> Any:
+        """Return the noise of an observation with these standard deviations."""
+        models = self._gtsam.noiseModel
+        normal = models.Diagonal.Sigmas(np.array(sds))
+        if not self._is_robust:
+            return normal
+
+        cauchy = models.mEstimator.Cauchy.Create(CAUCHY)
+        return models.Robust.Create(cauchy, normal)
 
     @property
     def last(self) -> int:
@@ -123,13 +140,30 @@ class Problem:
         self._start = self._gtsam.Values()
         return new
 
-    def solve(self) -> Floats:
-        """Solve for the (n, 3) poses, without the start."""
+    def solve(self, start: Any = None) -> Any:
+        """Solve for gtsam's values, from those of `start`, by path integration without it."""
+        first = self._start if start is None else start
         parameters = self._gtsam.LevenbergMarquardtParams()
         parameters.setMaxIterations(STEPS)
-        optimizer = self._gtsam.LevenbergMarquardtOptimizer(self._graph, self._start, parameters)
+        return self._gtsam.LevenbergMarquardtOptimizer(self._graph, first, parameters).optimize()
+
+    def cost(self, values: Any) -> float:
+        """Return half of the weighed sum of squares that `solve` makes least."""
+        return float(self._graph.error(values))
+
+    def poses(self, values: Any) -> Floats:
+        """Return the (n, 3) poses, without the start."""
         keys = [self._key(number) for number in range(1, self._count + 1)]
-        return optional.gtsam_poses(optimizer.optimize(), keys)
+        return optional.gtsam_poses(values, keys)
+
+    def landmark_m(self, values: Any, number: int) -> Floats:
+        """Return where a landmark is, (2,); NaN for one that was never seen."""
+        landmark = self._gtsam.symbol("l", number)
+        if landmark not in self._known:
+            return np.full(2, np.nan)
+
+        position_m: Floats = values.atPoint2(landmark)
+        return position_m
 
     def _key(self, number: int) -> int:
         key: int = self._gtsam.symbol("x", number)

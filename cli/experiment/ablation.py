@@ -12,13 +12,16 @@ from rich.table import Table
 from cogmap.cli.experiment import results
 from cogmap.cli.experiment.options import Common, common_options_without_sensing
 from cogmap.cli.progress import bar
-from cogmap.experiments.ablation import city, loop, recorded, town
-from cogmap.experiments.ablation.measure import Domain, measure
+from cogmap.experiments.ablation import city, errands, loop, recorded, town
+from cogmap.experiments.ablation.measure import ERROR, Domain, measure
 from cogmap.experiments.ablation.metrics import Metrics, ablation_metrics
 from cogmap.experiments.ablation.variants import LABELS, OURS
 
 NAME = "ablation"
 SEEDS = 5
+ERRANDS = 3
+"""Of the seeds: the drives take long."""
+
 _EPILOG = """\b
 Examples:
   cogmap experiment ablation --json ablation.json
@@ -33,7 +36,8 @@ Examples:
     type=click.IntRange(1, 1000),
     default=SEEDS,
     show_default=True,
-    help="How many seeds from --seed on: towns, cities, and paths of figure 6.",
+    help="How many seeds from --seed on: towns, cities, and paths of figure 6; "
+    f"of errands the first {ERRANDS}.",
 )
 @click.option(
     "--cities",
@@ -54,8 +58,9 @@ def ablation(common: Common, seeds: int, cities: Path | None, mrclam: Path | Non
     """Measure what each of our additions to the paper's model gains: with our rules, with one of
     them taken away at a time, and with all of the paper's.
 
-    Laps of a town whose goals the agent plans its way to, maps of cities, and the path of figure 6,
-    all at the level of percepts: nothing is rendered. Beside each stands path integration alone, of
+    Laps of a town whose goals the agent plans its way to, errands to several goals in an order of
+    its own, maps of cities, and the path of figure 6, all at the level of percepts: nothing is
+    rendered. Beside each stands path integration alone, of
     fused self-motion and of wheels. A run that is lost, or ends early, is counted. Takes some ten
     minutes on two cores; with --mrclam several times as long.
     """
@@ -82,9 +87,18 @@ def _domains(seeds: Sequence[int], cities: Path | None, mrclam: Path | None) -> 
     towns = [town.TownDrive(seed) for seed in seeds]
     traversals = city.grown(seeds) if cities is None else city.of_extracts(cities, seeds)
     loops = [loop.LoopDrive(seed) for seed in seeds]
+    tasks = [errands.Errands(seed) for seed in seeds[:ERRANDS]]
     domains = [
         Domain("mrclam", "MRCLAM, path in the end", "m", logs),
         Domain("town", "town, estimate", "m", towns, plans=True),
+        Domain(
+            "errands",
+            "errands, way over the shortest",
+            "over_shortest",
+            tasks,
+            plans=True,
+            quantity="way",
+        ),
         Domain("cities", "cities, buildings", "km2", traversals),
         Domain("loop", "figure 6, path in the end", "m", loops),
     ]
@@ -95,27 +109,32 @@ def table(domains: Sequence[Domain], metrics: Metrics) -> Table:
     """Return mean and SD of the errors, in parentheses the mean over fused self-motion's, and how
     many runs were lost.
     """
-    headings = [f"{domain.label}, {domain.unit}" for domain in domains]
+    headings = [_heading(domain) for domain in domains]
     rows = Table("rules", *headings, title="errors, mean ± SD (over fused self-motion alone)")
 
     for variant, label in LABELS.items():
-        cells = [_cell(f"{domain.name}_{variant}", domain.unit, metrics) for domain in domains]
+        cells = [_cell(f"{domain.name}_{variant}", domain, metrics) for domain in domains]
         rows.add_row(label, *cells)
 
     rows.add_section()
     for alone in ("fused", "wheels"):
         cells = []
         for domain in domains:
-            cells.append(_spread(f"{domain.name}_{OURS}_{alone}_error_{domain.unit}", metrics))
+            name = f"{domain.name}_{OURS}_{alone}_{domain.quantity}_{domain.unit}"
+            cells.append(_spread(name, metrics) if domain.quantity == ERROR else "")
         rows.add_row(f"{alone} alone, on our drives", *cells)
 
     return rows
 
 
-def _cell(name: str, unit: str, metrics: Metrics) -> str:
+def _heading(domain: Domain) -> str:
+    return f"{domain.label}, {domain.unit}" if domain.quantity == ERROR else domain.label
+
+
+def _cell(name: str, domain: Domain, metrics: Metrics) -> str:
     over = metrics[f"{name}_over_fused_mean"]
     lost = metrics[f"{name}_lost"]
-    text = _spread(f"{name}_error_{unit}", metrics)
+    text = _spread(f"{name}_{domain.quantity}_{domain.unit}", metrics)
     if over is not None:
         text += f" ({over:.2f})"
     if lost:

@@ -12,12 +12,12 @@ from matplotlib.lines import Line2D
 
 from cogmap.cli.plots.palette import CLOSED, ESTIMATE, FAINT, FUSED, WHEELS
 from cogmap.cli.plots.sheet import describe, new_sheet
-from cogmap.experiments.ablation.measure import Domain, Measured
+from cogmap.experiments.ablation.measure import ERROR, Domain, Measured
 from cogmap.experiments.ablation.outcome import Outcome
 from cogmap.experiments.ablation.variants import LABELS, OURS
 
 PANEL_IN = 4.2
-UNITS = {"m": "m", "km2": "km²"}
+UNITS = {"m": "error, m", "km2": "error, km²", "over_shortest": "way over the shortest"}
 
 
 def figure(domains: Sequence[Domain], measured: Measured) -> Figure:
@@ -37,7 +37,7 @@ def figure(domains: Sequence[Domain], measured: Measured) -> Figure:
 
 def _legend() -> list[Line2D]:
     return [
-        Line2D([], [], marker="o", ls="", ms=4, color=FAINT, label="the agent's error in a run"),
+        Line2D([], [], marker="o", ls="", ms=4, color=FAINT, label="the agent in a run"),
         Line2D([], [], marker="x", ls="", ms=6, color=CLOSED, label="in a run that was lost"),
         Line2D([], [], marker="D", ls="", ms=7, color=ESTIMATE, label="mean"),
         Line2D([], [], color=FUSED, lw=1.5, label="fused self-motion alone, mean on our drives"),
@@ -52,10 +52,10 @@ def _draw(axes: Axes, domain: Domain, measured: Measured) -> None:
     ours = measured[domain.name, OURS]
     axes.axvline(_mean([each.fused for each in ours]), color=FUSED, lw=1.5, zorder=1)
     axes.axvline(_mean([each.wheels for each in ours]), color=WHEELS, lw=1.5, ls="dotted", zorder=2)
-    if np.isfinite(axes.dataLim.intervalx).all():
+    if domain.quantity == ERROR and np.isfinite(axes.dataLim.intervalx).all():
         axes.set_xscale("log")
     axes.grid(axis="x", color=FAINT, alpha=0.2, lw=0.6)
-    describe(axes, domain.label, f"error, {UNITS[domain.unit]}")
+    describe(axes, domain.label, UNITS[domain.unit])
 
 
 def _draw_row(axes: Axes, row: int, outcomes: Sequence[Outcome]) -> None:

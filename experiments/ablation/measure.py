@@ -12,13 +12,15 @@ from cogmap.parallel import Progress, parallel_map
 
 # By the domain's name and the variant's, the outcome of each case.
 Measured = dict[tuple[str, str], list[Outcome]]
+ERROR = "error"
 RuleItems = tuple[tuple[str, str], ...]
 
 
 @dataclass(frozen=True)
 class Domain:
-    """Where the variants are compared: its cases, and the unit of its errors. Where the robot is
-    carried along a line, whether the agent `plans` its way or not, and how, changes nothing.
+    """Where the variants are compared: its cases, and the unit of its errors, or of another
+    `quantity`. Where the robot is carried along a line, whether the agent `plans` its way or not,
+    and how, changes nothing.
     """
 
     name: str
@@ -26,6 +28,7 @@ class Domain:
     unit: str
     cases: Sequence[Case]
     plans: bool = False
+    quantity: str = ERROR
 
     def effective(self, rules: Rules) -> RuleItems:
         """Return those of `rules` that can change a run, in the order of their names."""

@@ -16,7 +16,8 @@ Metrics = dict[str, float | str | None]
 
 
 def ablation_metrics(domains: Sequence[Domain], measured: Measured) -> Metrics:
-    """Return mean, SD and median of every cell, the runs that were lost, and ratios.
+    """Return mean, SD and median of every cell, the runs that were lost, and ratios: of errors, or
+    of what else a domain measures.
 
     `..._over_fused` is of the same run's fused self-motion alone, `..._over_ours_...` of the run of
     the same case by our rules. A cell is filled if each of its runs has a number or is counted as
@@ -30,7 +31,7 @@ def ablation_metrics(domains: Sequence[Domain], measured: Measured) -> Metrics:
         for variant in VARIANTS:
             outcomes = measured[domain.name, variant]
             filled += all(np.isfinite(each.error) or each.is_lost for each in outcomes)
-            metrics |= _cell(f"{domain.name}_{variant}", domain.unit, outcomes)
+            metrics |= _cell(f"{domain.name}_{variant}", domain, outcomes)
             if variant != OURS:
                 metrics |= spread(f"{variant}_over_ours_{domain.name}", over(outcomes, ours))
 
@@ -38,11 +39,12 @@ def ablation_metrics(domains: Sequence[Domain], measured: Measured) -> Metrics:
     return metrics | {"cells": float(cells), "cells_filled": float(filled)}
 
 
-def _cell(name: str, unit: str, outcomes: Sequence[Outcome]) -> Metrics:
+def _cell(name: str, domain: Domain, outcomes: Sequence[Outcome]) -> Metrics:
+    measured = f"{domain.quantity}_{domain.unit}"
     metrics: Metrics = {}
-    metrics |= spread(f"{name}_error_{unit}", [each.error for each in outcomes])
-    metrics |= spread(f"{name}_fused_error_{unit}", [each.fused for each in outcomes])
-    metrics |= spread(f"{name}_wheels_error_{unit}", [each.wheels for each in outcomes])
+    metrics |= spread(f"{name}_{measured}", [each.error for each in outcomes])
+    metrics |= spread(f"{name}_fused_{measured}", [each.fused for each in outcomes])
+    metrics |= spread(f"{name}_wheels_{measured}", [each.wheels for each in outcomes])
     metrics |= spread(f"{name}_over_fused", [each.over_fused for each in outcomes])
 
     failures = [each.failure for each in outcomes if each.failure]

@@ -15,7 +15,8 @@ LOST_OVER_FUSED = 2.0
 @dataclass(frozen=True)
 class Outcome:
     """Errors of the agent, of fused self-motion alone and of the wheels alone, in the unit of their
-    domain; NaN where there is none. `failure` says why a run ended early, empty if it did not.
+    domain, or what else that measures of the agent; NaN where there is none. `failure` says why a
+    run ended early, empty if it did not.
     """
 
     error: float

@@ -11,6 +11,7 @@ import pytest
 
 from cogmap.errors import CogmapError
 from cogmap.experiments.ablation import recorded
+from cogmap.experiments.ablation.errands import GOALS, Errands, drawn
 from cogmap.experiments.ablation.measure import Domain, measure
 from cogmap.experiments.ablation.metrics import ablation_metrics
 from cogmap.experiments.ablation.outcome import Outcome, carried
@@ -98,6 +99,33 @@ def test_a_drive_that_its_time_ends_is_lost() -> None:
 
     assert outcome.is_lost
     assert outcome.error < 1
+
+
+def test_errands_that_its_time_ends_have_no_way() -> None:
+    outcome = Errands(2, limit_s=2.0).drive({})
+
+    assert outcome.is_lost
+    assert np.isnan(outcome.error)
+
+
+def test_the_shortest_way_past_all_goals_is_no_shorter_than_to_the_farthest() -> None:
+    town = Errands(2).town
+    goals_m, shortest_m = drawn(town)
+    away_m = np.hypot(*(goals_m - (town.start.x_m, town.start.y_m)).T)
+
+    assert len(np.unique(goals_m, axis=0)) == GOALS
+    assert away_m.max() < shortest_m < 2 * away_m.sum()
+    assert drawn(Errands(2).town)[1] == shortest_m
+
+
+def test_a_way_is_named_so_among_the_metrics() -> None:
+    cases = [Reckoned(1.0), Reckoned(1.5)]
+    domain = Domain("errands", "errands", "over_shortest", cases, plans=True, quantity="way")
+
+    metrics = ablation_metrics([domain], measure([domain], 1, _quiet))
+
+    assert metrics["errands_ours_way_over_shortest_mean"] == 1.25
+    assert metrics["planning_gradient_over_ours_errands_mean"] == pytest.approx((2 + 2.5 / 1.5) / 2)
 
 
 def test_a_recorded_robot_is_measured_beside_its_wheels(tmp_path: Path) -> None:
