@@ -27,6 +27,10 @@ VERBS = {
         "cogmap.cli.experiment.map_structure:map_structure",
         "Sub-maps of real cities.",
     ),
+    "predictions": (
+        "cogmap.cli.experiment.predictions:predictions",
+        "Predictions of place cells, in recordings of yours.",
+    ),
     "route-planning": (
         "cogmap.cli.experiment.route_planning:route_planning",
         "Experiment 3, figure 5: the order of several goals.",

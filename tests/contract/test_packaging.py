@@ -93,6 +93,11 @@ def test_what_renders_trains_makes_tables_or_shows_is_optional() -> None:
     tables = _ranges("tables")
     (tested,) = _pins("dev")["pyarrow"].specifier
 
+    recordings = _ranges("recordings")
+    (read,) = _pins("dev")["pynwb"].specifier
+
+    assert recordings.keys() == {"pynwb"}
+    assert read.version in recordings["pynwb"].specifier
     assert _ranges("rerun").keys() == _pins("rerun").keys()
     assert tables.keys() == {"pyarrow"}
     assert tested.version in tables["pyarrow"].specifier
