@@ -21,6 +21,7 @@ export function replay(recorded) {
     throw new Error(`the log holds no ${COMMAND} of ${INSTANCE}`);
   }
   commands.sort((one, other) => order(one.envelope, other.envelope));
+  const inputs = byName(recorded);
 
   const found = { same: 0, different: 0, first: null };
   let wanderer = null;
@@ -32,7 +33,7 @@ export function replay(recorded) {
       incarnation = envelope.incarnation;
     }
 
-    const clause = difference(wanderer, command, recorded);
+    const clause = difference(wanderer, command, inputs);
     if (clause === null) {
       found.same += 1;
     } else {
@@ -51,16 +52,16 @@ function order(one, other) {
 }
 
 /** Return what differs between a recorded command and the answer to its causes, null if nothing. */
-function difference(wanderer, command, recorded) {
+function difference(wanderer, command, inputs) {
   const answers = [];
   for (const cause of command.envelope.causes) {
-    const [topic, source, number] = cause;
+    const [topic] = cause;
     if (topic !== SCAN) {
       return `a ${topic} led to it, which the wanderer does not receive`;
     }
 
-    const name = `${topic} number ${number} of ${source}`;
-    const input = named(cause, command.envelope.sent_ns, recorded);
+    const name = title(cause);
+    const input = sentBy(command.envelope.sent_ns, inputs.get(name) ?? []);
     if (input === undefined) {
       return `the log lacks ${name}, which led to it`;
     }
@@ -77,17 +78,31 @@ function difference(wanderer, command, recorded) {
   return inWords(command.payload, answers[0]);
 }
 
+/** Return the messages of each name, those sent first first. */
+function byName(recorded) {
+  const inputs = new Map();
+  for (const message of recorded) {
+    const { topic, source, seq } = message.envelope;
+    const name = title([topic, source, seq]);
+    inputs.set(name, [...(inputs.get(name) ?? []), message]);
+  }
+
+  for (const messages of inputs.values()) {
+    messages.sort((one, other) => (one.envelope.sent_ns < other.envelope.sent_ns ? -1 : 1));
+  }
+  return inputs;
+}
+
+function title([topic, source, number]) {
+  return `${topic} number ${number} of ${source}`;
+}
+
 /**
- * Return the message that a cause names: a source that was restarted numbers its messages anew, so
- * of those the last one that was sent by `sentNs`, or the first if their clocks say that none was.
+ * Return the one of `messages` of a name that is meant: a source that was restarted numbers its
+ * messages anew, so the last one sent by `sentNs`, or the first if their clocks say that none was.
  */
-function named([topic, source, number], sentNs, recorded) {
-  const found = recorded.filter(({ envelope }) => {
-    const isNamed = envelope.topic === topic && envelope.source === source;
-    return isNamed && envelope.seq === number;
-  });
-  found.sort((one, other) => (one.envelope.sent_ns < other.envelope.sent_ns ? -1 : 1));
-  return found.findLast(({ envelope }) => envelope.sent_ns <= sentNs) ?? found[0];
+function sentBy(sentNs, messages) {
+  return messages.findLast(({ envelope }) => envelope.sent_ns <= sentNs) ?? messages[0];
 }
 
 /** Return the first field in which two messages differ, null if their bytes are the same. */

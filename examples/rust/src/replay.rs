@@ -30,6 +30,9 @@ pub struct Recorded {
     pub payload: Vec<u8>,
 }
 
+/// Messages by what a cause names them by.
+type Inputs<'a> = HashMap<Cause, Vec<&'a Recorded>>;
+
 /// How many commands are the same to the byte, how many are not, and the first of these in words.
 #[derive(Default)]
 pub struct Found {
@@ -78,11 +81,12 @@ pub fn replay(recorded: &[Recorded]) -> Result<Found, String> {
     }
     commands.sort_by_key(|each| (each.envelope.incarnation, each.envelope.seq));
 
+    let inputs = by_name(recorded);
     let mut found = Found::default();
     for process in commands.chunk_by(|a, b| a.envelope.incarnation == b.envelope.incarnation) {
         let mut wanderer = Wanderer::new(process[0].envelope.seq);
         for command in process {
-            match difference(&mut wanderer, command, recorded) {
+            match difference(&mut wanderer, command, &inputs) {
                 None => found.same += 1,
                 Some(clause) => {
                     found.different += 1;
@@ -96,11 +100,7 @@ pub fn replay(recorded: &[Recorded]) -> Result<Found, String> {
 }
 
 /// What differs between a recorded command and the answer to its causes, if anything does.
-fn difference(
-    wanderer: &mut Wanderer,
-    command: &Recorded,
-    recorded: &[Recorded],
-) -> Option<String> {
+fn difference(wanderer: &mut Wanderer, command: &Recorded, inputs: &Inputs) -> Option<String> {
     let mut answers = Vec::new();
     for cause in &command.envelope.causes {
         let (topic, source, number) = cause;
@@ -111,10 +111,13 @@ fn difference(
         }
 
         let name = format!("{topic} number {number} of {source}");
-        let Some(payload) = input(cause, command.envelope.sent_ns, recorded) else {
+        let named = inputs.get(cause);
+        let input = named.and_then(|named| sent_by(command.envelope.sent_ns, named));
+        let Some(input) = input else {
             return Some(format!("the log lacks {name}, which led to it"));
         };
-        let scan = rmp_serde::from_slice::<RangeScan>(payload).map_err(|error| error.to_string());
+        let scan = rmp_serde::from_slice::<RangeScan>(&input.payload);
+        let scan = scan.map_err(|error| error.to_string());
         match scan.and_then(|scan| wanderer.on_scan(&scan)) {
             Ok(answer) => answers.push(encode(&answer)),
             Err(reason) => return Some(format!("{name} is refused: {reason}")),
@@ -127,22 +130,29 @@ fn difference(
     }
 }
 
-/// The message that a cause names. A source that was restarted numbers its messages anew: of those
-/// it is the last one that was sent by `sent_ns`, or the first if their clocks say that none was.
-fn input<'a>(cause: &Cause, sent_ns: u64, recorded: &'a [Recorded]) -> Option<&'a [u8]> {
-    let (topic, source, number) = cause;
-    let mut found: Vec<&Recorded> = recorded
-        .iter()
-        .filter(|Recorded { envelope, .. }| {
-            let is_named = envelope.topic == *topic && envelope.source == *source;
-            is_named && envelope.seq == *number
-        })
-        .collect();
-    found.sort_by_key(|each| each.envelope.sent_ns);
+/// The messages of each name, those sent first first.
+fn by_name(recorded: &[Recorded]) -> Inputs<'_> {
+    let mut inputs: Inputs = HashMap::new();
+    for each in recorded {
+        let Envelope {
+            topic, source, seq, ..
+        } = &each.envelope;
+        let name = (topic.clone(), source.clone(), *seq);
+        inputs.entry(name).or_default().push(each);
+    }
 
-    let last = found.iter().rfind(|each| each.envelope.sent_ns <= sent_ns);
-    let chosen = last.or(found.first())?;
-    Some(&chosen.payload)
+    for messages in inputs.values_mut() {
+        messages.sort_by_key(|each| each.envelope.sent_ns);
+    }
+    inputs
+}
+
+/// The one of `messages` of a name that is meant. A source that was restarted numbers its messages
+/// anew: it is the last one sent by `sent_ns`, or the first if their clocks say that none was.
+fn sent_by<'a>(sent_ns: u64, messages: &[&'a Recorded]) -> Option<&'a Recorded> {
+    let mut sent_first = messages.iter();
+    let last = sent_first.rfind(|each| each.envelope.sent_ns <= sent_ns);
+    last.or(messages.first()).copied()
 }
 
 /// The first field in which two messages differ, None if their bytes are the same.
