@@ -1,6 +1,9 @@
 """The map correction codelet: a loop that closes, or a landmark that comes again, corrects the
 path, and with it the map (paper §5.6, eq. 5-9).
 
+Beyond the paper, landmarks that are points correct it as it grows, whether a loop closes or not:
+what is believed now is then as good as what will be believed of it later, nearly.
+
 It may take longer than a cycle. So it writes nothing that others write meanwhile: it leaves a
 Correction node for the apply-correction codelet.
 """
@@ -53,6 +56,7 @@ from cogmap.schemas.nodes import (
     CORRECTION_ID,
     NEVER_NS,
     Correction,
+    LinkKind,
     LoopClosure,
     Object,
     Observations,
@@ -61,8 +65,15 @@ from cogmap.schemas.nodes import (
 from cogmap.services.codelets.config import SECTION, Config
 from cogmap.services.codelets.correction.joint import optimize_jointly
 from cogmap.services.codelets.correction.synapses import replay_of
-from cogmap.services.codelets.mapping.observations import Sightings
-from cogmap.services.codelets.mapping.path import POSE, STAMP, joins_of, steps_of
+from cogmap.services.codelets.mapping.observations import SAME_PLACE_S, Sightings
+from cogmap.services.codelets.mapping.path import (
+    POSE,
+    ROWS,
+    STAMP,
+    joins_of,
+    objects_along,
+    steps_of,
+)
 from cogmap.services.codelets.mapping.ranges import Ranges
 from cogmap.services.codelets.mapping.views import constraints_of, views_of
 
@@ -81,21 +92,66 @@ FALSE_CLOSURE = 1e-3
 EXPLAINED_MISFIT = 0.1
 # The path is corrected from this share of new closures on that it does not explain.
 UNEXPLAINED_SHARE = 0.1
+# Places of a short path after which the points seen along it correct it: between 3 and 10, which
+# were tried on robot 1 of MRCLAM's sixth set.
+GROWN_PLACES = 5
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     """Return one task if closures of the present pass were not judged yet, and enough of it are
     there to agree; unless some were judged just now, a correction waits to be applied, or the path,
     part of which is sparse, explains them. If one sighting closes a loop, there is one at once.
+
+    Return one about the path's last segment, too, if the points seen along the path bind it, and it
+    has grown.
     """
     if CORRECTION_ID in graph.nodes:
         return []
 
+    about = [closure.id for closure in _closures_due(context, graph, config)]
+    if not about and _is_bound_by_points(config):
+        about = _grown_segment(context, graph)
+    return [context.task(CODELET.name, about)] if about else []
+
+
+def _is_bound_by_points(config: Config) -> bool:
+    """Return whether sightings along the path bind it though no loop closes: each sighting of a
+    point errs by itself. Those of a building's side err alike, and bind one pass to the next alone.
+    """
+    is_ours = config.closes_by == "agreement" and config.correct == "heading"
+    return is_ours and config.landmarks == "points"
+
+
+def _grown_segment(context: CycleContext, graph: Graph) -> list[str]:
+    """Return the path's last segment if the place that the path has gained in this cycle is the
+    last of GROWN_PLACES, or of as many more as the path is longer than a short one, and landmarks
+    were seen along the segment in a direction. If some of them were surveyed, the agent has its
+    place from the map, which stays.
+    """
+    last = graph.last_segment
+    if last is None:
+        return []
+
+    rows = last.rows.numpy()
+    is_new = abs(context.stamp_ns * 1e-9 - float(rows[-1, STAMP])) < SAME_PLACE_S
+    places = last.number * ROWS + len(rows)
+    length = max(1, graph.count(PathSegment) // SHORT_SEGMENTS)
+    if not is_new or places < MIN_ROWS or places % (GROWN_PLACES * length):
+        return []
+
+    seen = objects_along(graph, last)
+    is_surveyed = any(landmark.surveyed for _, landmark in seen)
+    has_bearings = any(len(observations.rows.numpy()) for observations, _ in seen)
+    return [last.id] if has_bearings and not is_surveyed else []
+
+
+def _closures_due(context: CycleContext, graph: Graph, config: Config) -> list[LoopClosure]:
+    """Return the closures that are to be judged now."""
     closures = list(graph.of_kind(LoopClosure))
     unjudged = [closure for closure in closures if closure.accepted is None]
     is_sighted = any(not closure.range_alone for closure in unjudged)
     if config.closes_by == "sighting" and is_sighted:
-        return [context.task(CODELET.name, about=[closure.id for closure in unjudged])]
+        return unjudged
 
     since_ns = context.stamp_ns - config.revisit_s * 1e9
     late = [closure for closure in closures if closure.to_ns > since_ns]
@@ -118,14 +174,15 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
     if is_corrected and is_long and not is_heard and may_be_deferred(fresh, rows_of(path)):
         return []
 
-    return [context.task(CODELET.name, about=[closure.id for closure in fresh])]
+    return fresh
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
     """Return what becomes of all closures, the correction of the path, and its replay."""
     rows = rows_of(graph.of_kind(PathSegment))
     closures = sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns)
-    if not closures or len(rows) < 2:
+    is_bound = _is_bound_by_points(config)
+    if len(rows) < 2 or not (closures or is_bound):
         return Answer()
 
     judgement = _judge(closures, graph.path, config)
@@ -145,7 +202,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     closed_before = {closure.id for closure in closures if closure.accepted}
     fresh = [closure for closure in closures if closure.accepted is None]
     binds = any(closure.sd_m > MAX_VIEW_SD_M for closure in fresh)
-    if closed == closed_before and not (binds and config.correct == "heading"):
+    binds_anew = is_bound or (binds and config.correct == "heading")
+    if closed == closed_before and not binds_anew:
         return Answer(operations)
 
     # Perception knows the sizes of buildings that it has names for.
@@ -164,6 +222,8 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
             (each.to_ns for each in closures if each.accepted), default=NEVER_NS
         )
         is_settled = rows[:, STAMP] * 1e9 <= corrected_until_ns
+        if is_bound:
+            is_settled[:-GROWN_PLACES] = True
         before = rows[:, POSE]
         if not is_settled.any():
             is_settled[:] = True
@@ -191,7 +251,7 @@ CODELET = Codelet(
     phase=Phase.BACKGROUND,
     due=due,
     run=run,
-    reads=frozenset({PathSegment, Observations, LoopClosure, Object}),
+    reads=frozenset({PathSegment, Observations, LoopClosure, Object, LinkKind.ALONG}),
     writes=frozenset({LoopClosure, Correction}),
     config=Config,
     section=SECTION,
@@ -231,11 +291,11 @@ def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config)
     """
     rows = rows_of(path)
     steps = steps_of(rows, config)
-    is_view = np.array([not each.range_alone for each in closures])
+    is_view = np.array([not each.range_alone for each in closures], bool)
     views = views_of([each for each in closures if not each.range_alone], rows)
     believes_all = config.closes_by == "sighting"
     is_consistent = np.ones(len(views.i), bool)
-    if not believes_all:
+    if closures and not believes_all:
         is_consistent = consistent(views, steps, FALSE_CLOSURE)
     is_consistent &= views.j - views.i >= MIN_ROWS
 
@@ -245,7 +305,7 @@ def _judge(closures: list[LoopClosure], path: list[PathSegment], config: Config)
     if sparse:
         until_ns = sparse[-1].rows.numpy()[-1, STAMP] * 1e9
         settled = [bool(each.consistent) and each.to_ns <= until_ns for each in closures]
-        is_consistent |= np.array(settled)[is_view]
+        is_consistent |= np.array(settled, bool)[is_view]
 
     start = PoseGraph(
         poses=_start(rows[:, POSE], steps),

@@ -174,7 +174,8 @@ def _closure_by_landmark(
         return _closure_by_range(percept, task, landmark)
 
     to_ns = task.stamp_ns
-    if config.closes_by == "sighting" and not path_grows(graph, config):
+    is_exact = config.closes_by == "sighting" or config.landmarks == "points"
+    if is_exact and not path_grows(graph, config):
         percept, to_ns = _seen_from_path(percept, graph)
 
     # The pass before ended where `newest` began this one, or the landmark was last seen.
@@ -228,8 +229,9 @@ def _closure_by_landmark(
 def _seen_from_path(percept: Percept, graph: Graph) -> tuple[Percept, int]:
     """Return a percept as it is seen from the path's last place, and when the agent was there.
 
-    It may have turned on the spot since then. Of several views that must agree, one may be wrong by
-    that; of one, none.
+    It may have turned on the spot since then. Of several views of buildings that must agree, one
+    may be wrong by that; of one alone, none, nor of points among which a robot turns by 50° within
+    a place.
     """
     agent = graph.agent
     last = graph.last_segment

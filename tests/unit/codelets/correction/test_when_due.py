@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import msgspec
 import numpy as np
 import pytest
@@ -9,10 +11,20 @@ import pytest
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
 from cogmap.schemas.array import Array, Matrix
-from cogmap.schemas.nodes import LoopClosure, PathColumn, PathSegment, segment_id
+from cogmap.schemas.nodes import (
+    LoopClosure,
+    Object,
+    PathColumn,
+    PathSegment,
+    object_id,
+    segment_id,
+)
 from cogmap.schemas.sensing import Percepts
 from cogmap.services.codelets.config import Config
-from cogmap.services.codelets.correction.map_correction import CODELET
+from cogmap.services.codelets.correction.map_correction import CODELET, GROWN_PLACES, MIN_ROWS
+from cogmap.services.codelets.mapping.observations import Viewpoint, extended
+from cogmap.services.codelets.mapping.path import links_of
+from cogmap.services.player.public import sighting
 from cogmap.testing import graph_of
 
 CONFIG = Config(closure_spacing_s=2.0, revisit_s=100.0)
@@ -108,3 +120,44 @@ def test_no_closure_waits_while_no_part_of_the_path_is_sparse() -> None:
     graph = _with_fresh(1.5, 1.5, 1.5, is_sparse=False)
 
     assert _is_due(graph, 14, Config(revisit_s=100.0))
+
+
+def _grown(
+    places: int,
+    landmarks: Literal["buildings", "points"] = "points",
+    *,
+    bearing_sd_rad: float = 0.02,
+    surveyed: bool = False,
+) -> bool:
+    """Whether a correction is due at the moment that a path without closures, along which a
+    landmark is seen, has gained the last of so many places.
+    """
+    rows = np.zeros((places, len(PathColumn)))
+    rows[:, PathColumn.STAMP_S] = np.arange(places)
+    segment = PathSegment(id=segment_id(0), number=0, rows=Matrix.of(rows))
+    viewpoint = Viewpoint(number=0, stamp_s=0.0, step=np.zeros(3), range_gain=0.0)
+    percept = sighting("post", 0.0, 2.0, bearing_sd_rad=bearing_sd_rad, range_sd_m=0.1)
+    post = Object(id=object_id("post"), label="post", x_m=2.0, y_m=0.0, surveyed=surveyed)
+    observed = extended(None, viewpoint, percept)
+    graph = graph_of(segment, post, observed, *links_of(observed))
+    return _is_due(graph, places - 1, Config(landmarks=landmarks))
+
+
+def test_a_path_among_points_is_corrected_as_it_grows() -> None:
+    whole = 3 * GROWN_PLACES
+
+    assert whole > MIN_ROWS
+    assert _grown(whole)
+    assert not _grown(whole - 1)
+
+
+def test_a_path_among_buildings_is_corrected_by_closures_alone() -> None:
+    assert not _grown(3 * GROWN_PLACES, "buildings")
+
+
+def test_a_path_among_beacons_without_bearings_waits_for_closures() -> None:
+    assert not _grown(3 * GROWN_PLACES, bearing_sd_rad=float(np.pi))
+
+
+def test_a_surveyed_map_stays_as_the_path_grows() -> None:
+    assert not _grown(3 * GROWN_PLACES, surveyed=True)
