@@ -24,6 +24,8 @@ POSE_COLUMNS = slice(1, 4)
 ODOMETRY_COLUMNS = slice(4, 7)
 STAMP_TOLERANCE_S = 1e-6
 FILTER_KEY = "filter_rmse_m"
+ISAM2_KEY = "isam2_rmse_m"
+SMOOTHER_KEY = "smoother_rmse_m"
 
 
 class Drive(NamedTuple):
@@ -91,10 +93,10 @@ def follow(
 def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics:
     """Return the errors of one robot, each the mean over SEEDS.
 
-    `slam_rmse_m` is of the path as the map has it in the end, as the smoother's is;
-    `slam_online_rmse_m` of the estimate at each moment, before later observations corrected it, as
-    `isam2_rmse_m` is. `filter_rmse_m_0` and so on are of the particle filter by its SCALES.
-    `*_even_m` is of the moments at even times alone.
+    `slam_online_rmse_m` is of the estimate at each moment, before later observations corrected it,
+    as `isam2_rmse_m_0` and so on are, by the smoother's NOISES; `slam_rmse_m` is of the path as the
+    map has it in the end, as `smoother_rmse_m_0` and so on are. `filter_rmse_m_0` and so on are of
+    the particle filter by its SCALES. `*_even_m` is of the moments at even times alone.
     """
     log = list(moments(robot))
     stamps_s = np.array([moment.stamp_s for moment in log])
@@ -113,15 +115,18 @@ def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics
     in_the_end_m = [truth.aligned_error_m(drive.corrected(stamps_s)) for drive in mapping]
     online_m = [truth.aligned_error_m(drive.online) for drive in mapping]
     errors: Metrics = {
+        "slam_online_rmse_m": float(np.mean(online_m)),
         "known_map_rmse_m": float(np.mean([truth.rmse_m(path) for path in known])),
         "known_map_rmse_even_m": float(np.mean([even.rmse_m(path) for path in known])),
         "slam_rmse_m": float(np.mean(in_the_end_m)),
-        "slam_online_rmse_m": float(np.mean(online_m)),
         "path_integration_rmse_m": truth.aligned_error_m(mapping[0].odometry),
-        "smoother_rmse_m": truth.aligned_error_m(smoother.smooth(log)),
-        "isam2_rmse_m": truth.aligned_error_m(smoother.smooth_online(log)),
         "late_answers": float(sum(drive.late_answers for drive in mapping)),
     }
+
+    for number, noise in enumerate(smoother.NOISES):
+        online = smoother.smooth_online(log, noise)
+        errors[f"{ISAM2_KEY}_{number}"] = truth.aligned_error_m(online)
+        errors[f"{SMOOTHER_KEY}_{number}"] = truth.aligned_error_m(smoother.smooth(log, noise))
 
     for number, scales in enumerate(particle_filter.SCALES):
         filtered = particle_filter.localize(log, surveyed, start, scales, SEEDS[0])

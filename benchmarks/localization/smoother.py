@@ -5,11 +5,13 @@ which estimates each pose when it is there.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from benchmarks import optional
+from benchmarks.localization.loop import DRIFT_RAD_PER_M, SPEED, TURN
+from benchmarks.localization.particle_filter import SCALES
 from benchmarks.localization.senses import Moment
 from cogmap.geometry.arrays import Floats
 
@@ -19,13 +21,32 @@ SIDEWAYS_SHARE = 0.2
 CAUCHY = 2.0
 
 
-def smooth(moments: Sequence[Moment]) -> Floats:
+class Noise(NamedTuple):
+    """What is assumed of motion and observations: factors of the standard deviations that they
+    state, and the least variances of a step by its length in m and its turn in rad.
+    """
+
+    motion: float = 1.0
+    observation: float = 1.0
+    path_variance_per_m: float = 0.0
+    heading_variance_per_m: float = 0.0
+    heading_variance_per_rad: float = 0.0
+
+
+STATED = Noise()
+# The rule and the constants by which our maps are corrected.
+OURS = Noise(1.0, 1.0, SPEED**2, DRIFT_RAD_PER_M**2, TURN**2)
+# The one with the least error on the robots themselves is reported, in gtsam's favour.
+NOISES = (*(Noise(*scales) for scales in SCALES), OURS)
+
+
+def smooth(moments: Sequence[Moment], noise: Noise = STATED) -> Floats:
     """Return (n, 3) poses at the moments that fit all percepts and motions best; the start is at 0.
 
-    Levenberg-Marquardt on the same percepts, motions and noise that the codelets get; landmarks are
+    Levenberg-Marquardt on the same percepts and motions that the codelets get; landmarks are
     unknown. Raises UsageError if gtsam is not installed.
     """
-    problem = Problem()
+    problem = Problem(noise)
 
     for moment in moments:
         problem.add(moment)
@@ -33,7 +54,7 @@ def smooth(moments: Sequence[Moment]) -> Floats:
     return problem.poses(problem.solve())
 
 
-def smooth_online(moments: Sequence[Moment]) -> Floats:
+def smooth_online(moments: Sequence[Moment], noise: Noise = STATED) -> Floats:
     """Return (n, 3) poses, each as iSAM2 (Kaess et al. 2012) has it at its own moment; the start is
     at 0.
 
@@ -41,7 +62,7 @@ def smooth_online(moments: Sequence[Moment]) -> Floats:
     """
     gtsam = optional.gtsam()
     isam = gtsam.ISAM2(gtsam.ISAM2Params())
-    problem = Problem()
+    problem = Problem(noise)
     poses = []
 
     for moment in moments:
@@ -60,7 +81,8 @@ class Problem:
     does not count for much.
     """
 
-    def __init__(self, is_robust: bool = True) -> None:
+    def __init__(self, noise: Noise = STATED, is_robust: bool = True) -> None:
+        self._noise = noise
         self._is_robust = is_robust
         self._gtsam = optional.gtsam()
         self._graph = self._gtsam.NonlinearFactorGraph()
@@ -83,15 +105,17 @@ class Problem:
 
         step, sd = step_of(moment.motions)
         motion = self._gtsam.Pose2(*step)
-        noise = self._gtsam.noiseModel.Diagonal.Sigmas(sd)
-        factor = self._gtsam.BetweenFactorPose2(before, here, motion, noise)
+        sd = with_noise(step, sd, self._noise)
+        sigmas = self._gtsam.noiseModel.Diagonal.Sigmas(sd)
+        factor = self._gtsam.BetweenFactorPose2(before, here, motion, sigmas)
         self._graph.add(factor)
 
         self._pose = self._pose.compose(motion)
         self._start.insert(here, self._pose)
 
         for percept in moment.percepts:
-            noise = self._observed((percept.bearing_sd_rad, percept.range_sd_m))
+            stated = np.array([percept.bearing_sd_rad, percept.range_sd_m])
+            noise = self._observed(self._noise.observation * stated)
 
             _, _, number = percept.name.rpartition("-")
             landmark = self._gtsam.symbol("l", int(number))
@@ -110,14 +134,14 @@ class Problem:
         deviations of x_m, y_m and heading_rad.
         """
         nowhere = self._gtsam.Pose2(0.0, 0.0, 0.0)
-        noise = self._observed(sds)
+        noise = self._observed(np.array(sds))
         before = self._key(number)
         self._graph.add(self._gtsam.BetweenFactorPose2(before, self.last, nowhere, noise))
 
-    def _observed(self, sds: Sequence[float]) -> Any:
+    def _observed(self, sds: Floats) -> Any:
         """Return the noise of an observation with these standard deviations."""
         models = self._gtsam.noiseModel
-        normal = models.Diagonal.Sigmas(np.array(sds))
+        normal = models.Diagonal.Sigmas(sds)
         if not self._is_robust:
             return normal
 
@@ -186,3 +210,13 @@ def step_of(rows: Floats) -> tuple[Floats, Floats]:
     turn_sd_rad = np.sqrt(np.square(turn_rate_sd * dt).sum())
     sds = np.array([distance_sd_m, SIDEWAYS_SHARE * distance_sd_m, turn_sd_rad])
     return step, sds + MIN_SD
+
+
+def with_noise(step: Floats, sds: Floats, noise: Noise) -> Floats:
+    """Return the standard deviations (3,) of a step that states `sds`, by `noise`."""
+    length_m = float(np.hypot(*step[:2]))
+    least_m2 = noise.path_variance_per_m * length_m
+    least_rad2 = noise.heading_variance_per_m * length_m
+    least_rad2 += noise.heading_variance_per_rad * abs(float(step[2]))
+    least = np.sqrt([least_m2, SIDEWAYS_SHARE**2 * least_m2, least_rad2])
+    return np.asarray(np.maximum(noise.motion * sds, least))

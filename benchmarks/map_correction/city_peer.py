@@ -177,7 +177,7 @@ class Senses:
         return np.array([robust.landmark_m(best, number) for number in self._numbers.values()])
 
     def _problem(self, is_robust: bool) -> Problem:
-        problem = Problem(is_robust)
+        problem = Problem(is_robust=is_robust)
         numbers: dict[int, int] = {}
         for number, view in enumerate(self._views, start=1):
             problem.add(view.moment)

@@ -8,9 +8,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from benchmarks.localization import left_out, particle_filter
+from benchmarks.localization import left_out, particle_filter, smoother
 from benchmarks.localization.drives import follow
 from benchmarks.localization.loop import LOCALIZATION, LocalizationLoop
+from benchmarks.localization.measure import best_noise
 from benchmarks.localization.senses import label_of, moments
 from benchmarks.optional import trajectory_error_m
 from cogmap.data.mrclam import Robot
@@ -227,3 +228,20 @@ def test_constants_are_halved_and_doubled_one_at_a_time() -> None:
     assert found["ours"] == {}
     assert found["range_gain_sd_doubled"] == {"range_gain_sd": pytest.approx(0.06)}
     assert len(found) == 1 + 2 * len(left_out.CONSTANTS)
+
+
+def test_a_peer_has_the_noise_that_it_errs_least_with() -> None:
+    means = {"isam2_rmse_m_0": 0.3, "isam2_rmse_m_1": 0.1, "isam2_rmse_m_2": 0.2}
+
+    assert best_noise(means, "isam2_rmse_m", 3) == 1
+
+
+def test_our_rule_gives_a_peer_the_least_variance_of_a_step() -> None:
+    step = np.array([0.3, 0.4, -0.2])
+    exact = np.full(3, 1e-4)
+
+    sds = smoother.with_noise(step, exact, smoother.Noise(1.0, 1.0, 0.02, 0.06, 0.5))
+
+    assert sds[0] == pytest.approx(math.sqrt(0.02 * 0.5))
+    assert sds[2] == pytest.approx(math.sqrt(0.06 * 0.5 + 0.5 * 0.2))
+    assert (smoother.with_noise(step, exact, smoother.Noise(2.0)) == 2 * exact).all()
