@@ -26,6 +26,7 @@ STAMP_TOLERANCE_S = 1e-6
 FILTER_KEY = "filter_rmse_m"
 ISAM2_KEY = "isam2_rmse_m"
 SMOOTHER_KEY = "smoother_rmse_m"
+FIRST_KNOWN_KEY = "known_map_first_rmse_m"
 
 
 class Drive(NamedTuple):
@@ -96,7 +97,8 @@ def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics
     `slam_online_rmse_m` is of the estimate at each moment, before later observations corrected it,
     as `isam2_rmse_m_0` and so on are, by the smoother's NOISES; `slam_rmse_m` is of the path as the
     map has it in the end, as `smoother_rmse_m_0` and so on are. `filter_rmse_m_0` and so on are of
-    the particle filter by its SCALES. `*_even_m` is of the moments at even times alone.
+    the particle filter by its SCALES. `*_even_m` is of the moments at even times alone,
+    `known_map_first_rmse_m` of the first of SEEDS alone.
     """
     log = list(moments(robot))
     stamps_s = np.array([moment.stamp_s for moment in log])
@@ -117,6 +119,7 @@ def evaluate(robot: Robot, landmarks: dict[int, tuple[float, float]]) -> Metrics
     errors: Metrics = {
         "slam_online_rmse_m": float(np.mean(online_m)),
         "known_map_rmse_m": float(np.mean([truth.rmse_m(path) for path in known])),
+        FIRST_KNOWN_KEY: truth.rmse_m(known[0]),
         "known_map_rmse_even_m": float(np.mean([even.rmse_m(path) for path in known])),
         "slam_rmse_m": float(np.mean(in_the_end_m)),
         "path_integration_rmse_m": truth.aligned_error_m(mapping[0].odometry),

@@ -20,7 +20,13 @@ from benchmarks.localization import (
     without_names,
 )
 from benchmarks.localization import trees as tree_drive
-from benchmarks.localization.drives import FILTER_KEY, ISAM2_KEY, SMOOTHER_KEY, evaluate
+from benchmarks.localization.drives import (
+    FILTER_KEY,
+    FIRST_KNOWN_KEY,
+    ISAM2_KEY,
+    SMOOTHER_KEY,
+    evaluate,
+)
 from benchmarks.localization.recovery import evaluate_recovery
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
@@ -139,6 +145,7 @@ def _measure_robots(setting: Setting, folder: Path) -> Metrics:
         candidate = partial(left_out.evaluate_candidate, landmarks=recording.landmarks)
         errors_m = parallel_map(candidate, left_out.jobs(recording), setting.processes, progress)
 
+    ours_m = [row.pop(FIRST_KNOWN_KEY) for row in rows]
     metrics = _means(rows)
     chosen = {key: best_noise(metrics, key, count) for key, count in PEERS.items()}
     for key, count in PEERS.items():
@@ -149,7 +156,7 @@ def _measure_robots(setting: Setting, folder: Path) -> Metrics:
     metrics["slam_online_over_isam2"] = metrics["slam_online_rmse_m"] / metrics[ISAM2_KEY]
     metrics["known_map_over_filter"] = metrics["known_map_rmse_m"] / metrics[FILTER_KEY]
     metrics["slam_vs_smoother"] = metrics["slam_rmse_m"] / metrics[SMOOTHER_KEY]
-    metrics |= left_out.summary(errors_m)
+    metrics |= left_out.summary(ours_m, errors_m)
     metrics |= _means(recoveries)
     metrics["recovery_worst_s"] = max(row["recovery_worst_s"] for row in recoveries)
     metrics |= timings

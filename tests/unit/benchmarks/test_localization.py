@@ -222,6 +222,16 @@ def test_a_robot_that_is_left_out_has_the_constants_that_the_others_choose() -> 
     assert left_out.left_out_error_m(by_robot_m) == pytest.approx((0.5 + 0.3 + 0.3) / 3)
 
 
+def test_our_constants_are_not_driven_again_to_be_left_out() -> None:
+    others = 2 * len(left_out.CONSTANTS)
+    worse_m = [0.2] * others + [0.6] * others
+
+    metrics = left_out.summary([0.1, 0.3], worse_m)
+
+    assert metrics[left_out.KEY] == pytest.approx(0.2)
+    assert metrics["known_map_range_gain_sd_doubled_over_ours"] == pytest.approx(2.0)
+
+
 def test_constants_are_halved_and_doubled_one_at_a_time() -> None:
     found = dict(left_out.candidates())
 
