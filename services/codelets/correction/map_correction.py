@@ -109,24 +109,36 @@ def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
         return []
 
     about = [closure.id for closure in _closures_due(context, graph, config)]
-    if not about and _is_bound_by_points(config):
-        about = _grown_segment(context, graph)
+    if not about and config.landmarks == "points":
+        grown = _grown_segment(context, graph)
+        about = grown if grown and _is_bound_by_points(graph, config) else []
     return [context.task(CODELET.name, about)] if about else []
 
 
-def _is_bound_by_points(config: Config) -> bool:
-    """Return whether sightings along the path bind it though no loop closes: each sighting of a
-    point errs by itself. Those of a building's side err alike, and bind one pass to the next alone.
+def _is_bound_by_points(graph: Graph, config: Config) -> bool:
+    """Return whether sightings along the path's last segment bind it though no loop closes: each
+    sighting of a point errs by itself. Those of a building's side err alike, and bind one pass to
+    the next alone.
+
+    The points must have been seen in a direction, and have names: of others, which is which may be
+    mistaken. If some were surveyed, the agent has its place from the map, which stays.
     """
     is_ours = config.closes_by == "agreement" and config.correct == "heading"
-    return is_ours and config.landmarks == "points"
+    last = graph.last_segment
+    if last is None or not is_ours or config.landmarks != "points":
+        return False
+
+    seen = objects_along(graph, last)
+    is_surveyed = any(landmark.surveyed for _, landmark in seen)
+    is_bound = any(
+        any(landmark.names) and len(observations.rows.numpy()) for observations, landmark in seen
+    )
+    return is_bound and not is_surveyed
 
 
 def _grown_segment(context: CycleContext, graph: Graph) -> list[str]:
     """Return the path's last segment if the place that the path has gained in this cycle is the
-    last of GROWN_PLACES, or of as many more as the path is longer than a short one, and landmarks
-    were seen along the segment in a direction. If some of them were surveyed, the agent has its
-    place from the map, which stays.
+    last of GROWN_PLACES, or of as many more as the path is longer than a short one.
     """
     last = graph.last_segment
     if last is None:
@@ -136,13 +148,8 @@ def _grown_segment(context: CycleContext, graph: Graph) -> list[str]:
     is_new = abs(context.stamp_ns * 1e-9 - float(rows[-1, STAMP])) < SAME_PLACE_S
     places = last.number * ROWS + len(rows)
     length = max(1, graph.count(PathSegment) // SHORT_SEGMENTS)
-    if not is_new or places < MIN_ROWS or places % (GROWN_PLACES * length):
-        return []
-
-    seen = objects_along(graph, last)
-    is_surveyed = any(landmark.surveyed for _, landmark in seen)
-    has_bearings = any(len(observations.rows.numpy()) for observations, _ in seen)
-    return [last.id] if has_bearings and not is_surveyed else []
+    is_whole = places >= MIN_ROWS and places % (GROWN_PLACES * length) == 0
+    return [last.id] if is_new and is_whole else []
 
 
 def _closures_due(context: CycleContext, graph: Graph, config: Config) -> list[LoopClosure]:
@@ -181,7 +188,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
     """Return what becomes of all closures, the correction of the path, and its replay."""
     rows = rows_of(graph.of_kind(PathSegment))
     closures = sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns)
-    is_bound = _is_bound_by_points(config)
+    is_bound = _is_bound_by_points(graph, config)
     if len(rows) < 2 or not (closures or is_bound):
         return Answer()
 
