@@ -27,7 +27,7 @@ NAME = "cue-integration"
 _EPILOG = """\b
 Examples:
   cogmap experiment cue-integration --json cue.json
-  cogmap experiment cue-integration --seeds 1          one seed, in half a minute
+  cogmap experiment cue-integration --seeds 1          one seed, in a minute
   cogmap experiment cue-integration --fit              fit the noise of the senses first
   cogmap experiment cue-integration --range-only       distances alone, as in the paper's table 1
   cogmap experiment cue-integration --landmark-noise 0.03   landmarks far better than self-motion
@@ -38,7 +38,7 @@ Examples:
 @click.option(
     "--trials",
     type=click.IntRange(8, 100_000),
-    default=100,
+    default=200,
     show_default=True,
     help="Trials of each condition, with each seed.",
 )
