@@ -32,7 +32,7 @@ class Benchmark:
     docstring is the command's help. In `all` it gets `arguments`, and for each key of `data` paths
     within the folder that the user gives. `option_thresholds` are of metrics that are measured only
     if an option is given. Without `has_command` it is the command of another row, or of
-    `cogmap experiment`, run with arguments.
+    `cogmap experiment`, run with arguments. One that is not `in_all` runs there with --only alone.
     """
 
     name: str
@@ -43,6 +43,7 @@ class Benchmark:
     arguments: Mapping[str, object] = field(default_factory=dict)
     option_thresholds: Thresholds = field(default_factory=dict)
     has_command: bool = True
+    in_all: bool = True
 
     def arguments_in_all(self, data: Path | None) -> dict[str, Any]:
         """Return the arguments that `all` calls `measure` with. Raises UsageError if `data`, the

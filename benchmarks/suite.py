@@ -11,7 +11,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from benchmarks import paper
+from benchmarks import constants, paper
 from benchmarks.benchmark import PROCESSES, Benchmark, Setting
 from benchmarks.bus import measure as bus
 from benchmarks.cognition import measure as cognition
@@ -131,7 +131,7 @@ SUITE = (
         },
         option_thresholds=false_groups.THRESHOLDS,
     ),
-    Benchmark("city_peer", {}, city_peer.measure, options=city_peer.OPTIONS),
+    Benchmark("city_peer", {}, city_peer.measure, options=city_peer.OPTIONS, in_all=False),
     Benchmark("map_size", map_size.THRESHOLDS, map_size.measure),
     Benchmark("map_structure", map_structure.THRESHOLDS, map_structure.measure),
     Benchmark("place_grid", place_grid.THRESHOLDS, place_grid.measure),
@@ -172,13 +172,25 @@ SUITE = (
         has_command=False,
     ),
     Benchmark("city-maps", paper.CITY_MAPS_THRESHOLDS, paper.measure_city_maps, has_command=False),
+    Benchmark(
+        "city-maps-people",
+        paper.PEOPLE_THRESHOLDS,
+        paper.measure_against_people,
+        data={"cities": "city_streets"},
+        has_command=False,
+    ),
+    Benchmark("ablation", {}, paper.measure_ablation, has_command=False),
+    Benchmark("constants", {}, constants.measure, options=constants.OPTIONS, in_all=False),
 )
 NAMES = tuple(benchmark.name for benchmark in SUITE)
 
 
 def selected(only: Sequence[str], skip: Sequence[str]) -> list[Benchmark]:
-    """Return the benchmarks of `only`, all if it is empty, without those of `skip`."""
-    wanted = set(only or NAMES) - set(skip)
+    """Return the benchmarks of `only`, if it is empty all that are for it, without those of
+    `skip`.
+    """
+    usual = [benchmark.name for benchmark in SUITE if benchmark.in_all]
+    wanted = set(only or usual) - set(skip)
     return [benchmark for benchmark in SUITE if benchmark.name in wanted]
 
 

@@ -15,15 +15,16 @@ from benchmarks import optional
 from benchmarks.benchmark import PROCESSES, Setting, path_option
 from benchmarks.localization.senses import Moment, label_of
 from benchmarks.localization.smoother import Problem
+from benchmarks.paper import street_environments
 from benchmarks.report import Metrics
 from cogmap.cli.progress import bar
 from cogmap.experiments.city_maps.correction import HEADING, PLACE_SD_M, PLACE_SD_RAD
 from cogmap.experiments.city_maps.drive import MODULES, driven
-from cogmap.experiments.city_maps.environment import Environment, environments
+from cogmap.experiments.city_maps.environment import Environment
 from cogmap.experiments.city_maps.fit import halves
 from cogmap.experiments.city_maps.measure import NOISE, Job, configurations, jobs, map_error_km2
 from cogmap.experiments.city_maps.observer import WHEELS
-from cogmap.experiments.city_maps.sources import folder, grown_environments
+from cogmap.experiments.city_maps.sources import grown_environments
 from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_from
 from cogmap.parallel import parallel_map
@@ -91,10 +92,7 @@ def _places(cities: Path | None, maps: int) -> list[Environment]:
     if cities is None:
         return grown_environments(maps, SEED)
 
-    found = []
-    for city in folder(cities, SEED):
-        found += environments(city, 1, SEED)
-    _, tested = halves(found)
+    _, tested = halves(street_environments(cities, SEED))
     return tested[:maps]
 
 

@@ -68,27 +68,29 @@ def ablation(common: Common, seeds: int, cities: Path | None, mrclam: Path | Non
     chosen = range(common.seed, common.seed + seeds)
 
     with bar("choosing cities"):
-        domains = _domains(chosen, cities, mrclam)
+        driven_in = domains(chosen, cities, mrclam)
     with bar("drives") as progress:
-        measured = measure(domains, common.processes, progress)
+        measured = measure(driven_in, common.processes, progress)
 
-    metrics = ablation_metrics(domains, measured)
+    metrics = ablation_metrics(driven_in, measured)
     metrics["seeds"] = float(seeds)
-    Console().print(table(domains, metrics))
+    Console().print(table(driven_in, metrics))
 
     from cogmap.cli.plots.ablation import figure  # matplotlib takes long to import
 
-    results.save(folder, NAME, figure(domains, measured), metrics, common)
+    results.save(folder, NAME, figure(driven_in, measured), metrics, common)
 
 
-def _domains(seeds: Sequence[int], cities: Path | None, mrclam: Path | None) -> list[Domain]:
-    """Return what is driven, the longest drives first."""
+def domains(seeds: Sequence[int], cities: Path | None, mrclam: Path | None) -> list[Domain]:
+    """Return what is driven, the longest drives first: cities of a folder, and the robots of an
+    MRCLAM set, if they are given.
+    """
     logs = [] if mrclam is None else recorded.of_set(mrclam)
     towns = [town.TownDrive(seed) for seed in seeds]
     traversals = city.grown(seeds) if cities is None else city.of_extracts(cities, seeds)
     loops = [loop.LoopDrive(seed) for seed in seeds]
     tasks = [errands.Errands(seed) for seed in seeds[:ERRANDS]]
-    domains = [
+    found = [
         Domain("mrclam", "MRCLAM, path in the end", "m", logs),
         Domain("town", "town, estimate", "m", towns, plans=True),
         Domain(
@@ -102,24 +104,24 @@ def _domains(seeds: Sequence[int], cities: Path | None, mrclam: Path | None) -> 
         Domain("cities", "cities, buildings", "km2", traversals),
         Domain("loop", "figure 6, path in the end", "m", loops),
     ]
-    return [domain for domain in domains if domain.cases]
+    return [domain for domain in found if domain.cases]
 
 
-def table(domains: Sequence[Domain], metrics: Metrics) -> Table:
+def table(shown: Sequence[Domain], metrics: Metrics) -> Table:
     """Return mean and SD of the errors, in parentheses the mean over fused self-motion's, and how
     many runs were lost.
     """
-    headings = [_heading(domain) for domain in domains]
+    headings = [_heading(domain) for domain in shown]
     rows = Table("rules", *headings, title="errors, mean ± SD (over fused self-motion alone)")
 
     for variant, label in LABELS.items():
-        cells = [_cell(f"{domain.name}_{variant}", domain, metrics) for domain in domains]
+        cells = [_cell(f"{domain.name}_{variant}", domain, metrics) for domain in shown]
         rows.add_row(label, *cells)
 
     rows.add_section()
     for alone in ("fused", "wheels"):
         cells = []
-        for domain in domains:
+        for domain in shown:
             name = f"{domain.name}_{OURS}_{alone}_{domain.quantity}_{domain.unit}"
             cells.append(_spread(name, metrics) if domain.quantity == ERROR else "")
         rows.add_row(f"{alone} alone, on our drives", *cells)
