@@ -43,6 +43,7 @@ SOLVERS = {
     REPLAY: ("reverse replay", POSITIONS),
 }
 LEAST_SHOWN_M = 1e-3
+MAX_MARKED = 100
 
 
 def figure(loops: dict[str, Loop], solved: Solvers, metrics: dict[str, Any]) -> Figure:
@@ -134,7 +135,7 @@ def _draw_shifts(axes: Axes, before: Map, after: Map) -> None:
 def _draw_replay(axes: Axes, replay: Replayed) -> None:
     axes.plot(np.arange(len(replay.shifts_m)), replay.shifts_m, color=POSITIONS, lw=1.8)
     axes.set_ylim(bottom=0)
-    title = "d   shift of each place field, in its replay's order"
+    title = "d   shift of each place field, in the order of the replay"
     describe(axes, title, "places, from the one met again backwards", "shift, m")
 
 
@@ -148,10 +149,10 @@ def _draw_synapses(axes: Axes, replay: Replayed, metrics: dict[str, Any]) -> Non
     r = metrics["strength_and_shift_correlation_close_pairs"]
     axes.axline((0.0, 0.0), slope=slope, color=FAINT, lw=1.0, ls=(0, (4, 2)))
     axes.plot(nearer, changes, ".", ms=5, color=POSITIONS, alpha=0.6)
-    title = f"e   change of synapses, fields under {1 / replay.decay_per_m:g} m apart"
+    title = f"e   predicted change of synapses, fields under {1 / replay.decay_per_m:g} m apart"
     describe(
         axes,
-        f"{title}: {slope:.3f}/m, r = {r:.2f}",
+        f"{title}:\n{slope:.3f} a metre, r = {r:.2f}",
         "by how much two place fields come nearer, m",
         f"change of exp(-{replay.decay_per_m:g} d)",
     )
@@ -162,7 +163,8 @@ def _draw_solvers(axes: Axes, solved: Solvers) -> None:
     for name, (label, colour) in SOLVERS.items():
         apart_m = solved.curves[name].from_solution_m
         shown = np.flatnonzero(apart_m >= LEAST_SHOWN_M)
-        axes.plot(shown, apart_m[shown], ".-", ms=4, lw=1.4, color=colour, label=label)
+        marker = "." if len(apart_m) <= MAX_MARKED else ""
+        axes.plot(shown, apart_m[shown], marker=marker, lw=1.4, color=colour, label=label)
 
     axes.set_xscale("symlog", linthresh=1)
     axes.set_xlim(left=0)

@@ -95,7 +95,7 @@ def _draw_distances(axes: Axes, walks: Sequence[Measured]) -> None:
         axes.plot(distance, color=COLOURS[rule], lw=1.2, label=label)
 
     axes.set_ylim(0, 1)
-    axes.legend(frameon=False, fontsize=7.5)
+    axes.legend(frameon=False, fontsize=7.5, loc="center right", bbox_to_anchor=(1.0, 0.4))
     title = "c   total variation distance from the exact posterior, mean of the walks"
     describe(axes, title, "step", "0 same, 1 disjoint")
 

@@ -1,7 +1,8 @@
-"""A drive by the paper's own rules, by the modules of the town on the in-memory bus."""
+"""Drives by the paper's own rules and by spikes: the modules of the town on the in-memory bus."""
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from cogmap.experiments.loop_closing import run as loop_closing
@@ -34,6 +35,7 @@ def _driven(configured: Sections) -> Loop:
 def test_the_preset_reaches_every_rule_of_a_drive() -> None:
     assert rules_of(_small("paper")) == PRESETS["paper"]
     assert rules_of(_small("cogmap")) == PRESETS["cogmap"] | {"correct": "positions"}
+    assert rules_of(_small("spiking"))["localization"] == "spiking"
     assert rules_of(sections(1, "heading", "paper"))["correct"] == "heading"
 
 
@@ -43,3 +45,16 @@ def test_a_drive_by_the_papers_rules_closes_its_loop_by_one_sighting() -> None:
     assert [replay.passes for replay in loop.replays] == [10]
     assert loop.after.path_error_m < 0.7 * loop.before.path_error_m
     assert loop.end.true_path_m[-1] == pytest.approx(BLOCK_M[-1], abs=loop_closing.SPEED_M_S)
+
+
+def test_a_drive_by_spikes_stays_near_the_truth_and_repeats_to_the_bit() -> None:
+    first, again = (_driven(_small("spiking")) for _ in range(2))
+
+    assert first.end.end_error_m < 0.5 * _alone_m(first)
+    assert np.array_equal(first.end.path_m, again.end.path_m)
+
+
+def _alone_m(loop: Loop) -> float:
+    """How far self-motion alone is from the truth in the end."""
+    away_m = loop.fused_path_m[-1] - loop.end.true_path_m[-1]
+    return float(np.hypot(*away_m))
