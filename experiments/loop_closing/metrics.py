@@ -59,7 +59,11 @@ def solver_metrics(solved: Solvers) -> dict[str, float | None]:
     7 over its least, the distance from the path of the least cost, and the error of the path; and
     after how many the cost is within one percent of the least, None if that is never.
     """
-    metrics: dict[str, float | None] = {"solved_path_error_m": solved.least_path_error_m}
+    metrics: dict[str, float | None] = {
+        "solved_places": float(solved.places),
+        "solved_closures": float(solved.closures),
+        "solved_path_error_m": solved.least_path_error_m,
+    }
     for name, curve in solved.curves.items():
         metrics[f"{name}_solved_after_passes"] = curve.solved_after
         for passes in PASSES:

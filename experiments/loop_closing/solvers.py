@@ -51,9 +51,13 @@ class Curve:
 
 @dataclass(frozen=True)
 class Solvers:
-    """The curve of each solver, and the error of the path of the least cost from the truth."""
+    """The curve of each solver, how many places and closures it had, and the error of the path of
+    the least cost from the truth.
+    """
 
     curves: dict[str, Curve]
+    places: int
+    closures: int
     least_path_error_m: float
 
 
@@ -85,7 +89,12 @@ def solvers(loop: Loop) -> Solvers:
             path_error_m=np.array([rms_m(each - true_m) for each in positions_m]),
         )
 
-    return Solvers(curves, rms_m(solution_m - true_m))
+    return Solvers(
+        curves=curves,
+        places=len(graph.poses),
+        closures=len(graph.closures),
+        least_path_error_m=rms_m(solution_m - true_m),
+    )
 
 
 def _by_eq9(graph: PoseGraph, start_m: Floats) -> list[Floats]:

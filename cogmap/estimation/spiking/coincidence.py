@@ -45,6 +45,9 @@ WIDEST_SHARE = 0.75
 """The widest spacing over the extent of the samples, at least, as in figure 4's room."""
 
 DIRECTION_SDS = 0.1
+"""A head-direction cell's width over the standard deviation of headings: far narrower than a real
+cell's, as a population of those tells a direction. By the same 2 %, on no data."""
+
 DIRECTIONS_A_SD = 5
 MIN_SD_M = 0.005
 MIN_SD_RAD = 5e-4

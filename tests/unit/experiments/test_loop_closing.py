@@ -194,6 +194,7 @@ def test_one_reverse_replay_solves_one_loop_and_gauss_seidel_takes_many() -> Non
     """Of equal steps, and a closure a hundred times as certain, the end moves by 1600 / 1601."""
     metrics = solver_metrics(_solved())
 
+    assert (metrics["solved_places"], metrics["solved_closures"]) == (17, 1)
     assert metrics["reverse_replay_solved_after_passes"] == 1
     assert metrics["gauss_seidel_over_loops_solved_after_passes"] == 1
     assert metrics["reverse_replay_from_solution_after_1_passes_m"] == pytest.approx(0.0, abs=1e-9)
