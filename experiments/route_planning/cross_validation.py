@@ -1,14 +1,9 @@
 """Assumptions of participants chosen on some problems, and measured on another: by leaving out one
 problem at a time.
 
-A candidate is compared with people by the median excess of its participants: by the mean distance
-from people's median in widths of their interquartile range. That was settled before any candidate
-was measured by it.
-
-Few problems do not decide between candidates that are nearly as near to people, so that the nearest
-one is another if a single problem is left out. Such a choice is made stable by bagging (Breiman
-1996): problems are drawn again and again, and each candidate counts by how often it is the nearest.
-The participants are then a mixture, each with the assumptions of one candidate.
+A candidate is compared with people by the median excess of its participants. The criterion, the
+mean distance from people's median in widths of their interquartile range, was settled before any
+candidate was measured by it.
 """
 
 from __future__ import annotations
@@ -44,23 +39,22 @@ CANDIDATES = tuple(
 # Nobody's quartiles are nearer than that: where most people find the shortest tour, they coincide.
 MIN_RANGE = 0.001
 MIN_PROBLEMS = 2
-# Of the problems that assumptions are chosen on.
-RESAMPLES = 1000
 Metrics = dict[str, float]
 
 
 class Compared(NamedTuple):
-    """One problem: its name, people's excess (k,), and that of the participants of each candidate,
-    (c, p).
+    """One problem: its name, people's excess (k,), and the median excess of each candidate's
+    participants, (c,).
     """
 
     name: str
     people: Floats
-    participants: Floats
+    medians: Floats
 
-    def is_within(self, median: float) -> bool:
-        """Return whether a median lies within people's quartiles."""
+    def is_within(self, candidate: int) -> bool:
+        """Return whether a candidate's median lies within people's quartiles."""
         low, high = np.quantile(self.people, (0.25, 0.75)).tolist()
+        median = float(self.medians[candidate])
         return bool(low <= median <= high)
 
     def distances(self) -> Floats:
@@ -69,19 +63,7 @@ class Compared(NamedTuple):
         """
         low, middle, high = np.quantile(self.people, (0.25, 0.5, 0.75)).tolist()
         width = max(high - low, MIN_RANGE)
-        medians = np.median(self.participants, axis=1)
-        return np.asarray(np.abs(medians - middle) / width)
-
-    def median_of(self, shares: Floats) -> float:
-        """Return the median of participants of whom each candidate has its share (c,)."""
-        excess = self.participants.ravel()
-        _, number = self.participants.shape
-        weights = np.repeat(shares, number)
-
-        order = np.argsort(excess, kind="stable")
-        below = np.cumsum(weights[order])
-        middle = int(np.searchsorted(below, below[-1] / 2))
-        return float(excess[order][middle])
+        return np.asarray(np.abs(self.medians - middle) / width)
 
 
 class Job(NamedTuple):
@@ -108,9 +90,9 @@ def measure(
         for candidate in CANDIDATES:
             jobs.append(Job(problem, tour, candidate, participants, seed))
 
-    excess = parallel_map(_excess, jobs, processes, progress)
+    medians = parallel_map(_median, jobs, processes, progress)
     found = []
-    of_problem = np.reshape(excess, (len(problems), len(CANDIDATES), participants))
+    of_problem = np.reshape(medians, (len(problems), len(CANDIDATES)))
     for problem, tour, of_candidates in zip(problems, shortest, of_problem, strict=True):
         lengths = straight(problem.problem.positions)
         people = above(lengths, problem.tours, tour)
@@ -120,9 +102,8 @@ def measure(
 
 
 def metrics(problems: Sequence[Compared]) -> Metrics:
-    """Return the share of problems left out on which participants agree with people whose
-    assumptions were chosen on the others, and the share if they are chosen on all; and what was
-    chosen. Beside it, the share if the nearest candidate alone is taken.
+    """Return the share of problems left out on which the candidate that was chosen on the others
+    agrees with people, and the share if it is chosen on all; and what was chosen.
 
     Raises UsageError if there are too few problems to leave one out.
     """
@@ -132,73 +113,58 @@ def metrics(problems: Sequence[Compared]) -> Metrics:
             f"least {MIN_PROBLEMS} that people drew tours of"
         )
 
-    distances = np.array([problem.distances() for problem in problems])
-    in_sample = shares_of(distances)
+    in_sample = chosen(problems)
+    folds = []
+    for left_out in range(len(problems)):
+        others = [*problems[:left_out], *problems[left_out + 1 :]]
+        folds.append(chosen(others))
+
     is_within = []
     is_within_in_sample = []
-    is_nearest_within = []
-    folds = []
     found: Metrics = {}
-    for left_out, problem in enumerate(problems):
-        others = np.delete(distances, left_out, axis=0)
-        nearest = int(others.mean(axis=0).argmin())
-        folds.append(nearest)
-        nearest_median = float(np.median(problem.participants[nearest]))
-        is_nearest_within.append(problem.is_within(nearest_median))
-
-        shares = shares_of(others)
-        median = problem.median_of(shares)
-        is_within.append(problem.is_within(median))
-        is_within_in_sample.append(problem.is_within(problem.median_of(in_sample)))
+    for problem, candidate in zip(problems, folds, strict=True):
         name = problem.name.lower()
-        found[f"{name}_left_out_above_optimum_median"] = median
-        found[f"{name}_left_out_within_iqr"] = float(is_within[-1])
-        found |= described(f"{name}_left_out", shares)
+        is_within.append(problem.is_within(candidate))
+        is_within_in_sample.append(problem.is_within(in_sample))
+        found[f"{name}_left_out_above_optimum_median"] = float(problem.medians[candidate])
+        found[f"{name}_left_out_within_iqr"] = float(problem.is_within(candidate))
+        found |= described(f"{name}_left_out", CANDIDATES[candidate])
 
     commonest = Counter(folds).most_common(1)
     return {
         "within_iqr_share": float(np.mean(is_within)),
         "within_iqr_share_in_sample": float(np.mean(is_within_in_sample)),
-        "within_iqr_share_of_nearest": float(np.mean(is_nearest_within)),
         "candidates": float(len(CANDIDATES)),
         "folds_that_agree_share": commonest[0][1] / len(folds),
-        **described("in_sample", in_sample),
+        **described("in_sample", CANDIDATES[in_sample]),
         **found,
     }
 
 
-def shares_of(distances: Floats) -> Floats:
-    """Return in which share of samples of the problems, drawn with replacement, each candidate is
-    the nearest on the mean, (c,), by (n, c) distances.
-    """
-    number, candidates = distances.shape
-    rng = np.random.default_rng(number)
-    drawn = rng.integers(number, size=(RESAMPLES, number))
-    means = distances[drawn].mean(axis=1)
-    wins = np.bincount(means.argmin(axis=1), minlength=candidates)
-    return np.asarray(wins / RESAMPLES)
+def chosen(problems: Sequence[Compared]) -> int:
+    """Return the candidate whose medians are nearest to people's on the mean over `problems`."""
+    distances = [problem.distances() for problem in problems]
+    mean = np.mean(distances, axis=0)
+    return int(mean.argmin())
 
 
-def described(prefix: str, shares: Floats) -> Metrics:
-    """Return what is assumed on the mean over candidates, each by its share (c,), as numbers."""
-    numbers = []
-    for start, revision, spans, factor in CANDIDATES:
-        is_given = float(start is Start.GIVEN)
-        uncrosses = float(revision is Revision.CROSSINGS)
-        straightens = float(revision is Revision.STRAIGHTENED)
-        numbers.append((is_given, uncrosses, straightens, float(np.mean(spans)), float(factor)))
-
-    names = ("begins_at_given", "removes_crossings", "straightens", "span", "factor")
-    means = (shares @ np.array(numbers)).tolist()
-    return {f"{prefix}_{name}": mean for name, mean in zip(names, means, strict=True)}
+def described(prefix: str, assumptions: Assumptions) -> Metrics:
+    """Return assumptions as numbers, for a table of metrics."""
+    return {
+        f"{prefix}_begins_at_given": float(assumptions.start is Start.GIVEN),
+        f"{prefix}_removes_crossings": float(assumptions.revision is Revision.CROSSINGS),
+        f"{prefix}_straightens": float(assumptions.revision is Revision.STRAIGHTENED),
+        f"{prefix}_span": float(np.mean(assumptions.spans)),
+        f"{prefix}_factor": float(assumptions.factor),
+    }
 
 
 def _shortest(problem: HumanTours) -> Indices:
     return shortest_tour(straight(problem.problem.positions))
 
 
-def _excess(job: Job) -> Floats:
-    """Return the excess of a candidate's participants, (p,)."""
+def _median(job: Job) -> float:
+    """Return the median excess of a candidate's participants."""
     positions = job.problem.problem.positions
     lengths = straight(positions)
     first_visited = Counter(int(tour[0]) for tour in job.problem.tours)
@@ -207,4 +173,5 @@ def _excess(job: Job) -> Floats:
     tours = tours_under(
         job.candidate, lengths, positions, job.participants, seed=job.seed, given=given
     )
-    return above(lengths, tours, job.shortest)
+    excess = above(lengths, tours, job.shortest)
+    return float(np.median(excess))
