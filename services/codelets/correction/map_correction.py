@@ -121,7 +121,8 @@ def _is_bound_by_points(graph: Graph, config: Config) -> bool:
     the next alone.
 
     The points must have been seen in a direction, and have names: of others, which is which may be
-    mistaken. If some were surveyed, the agent has its place from the map, which stays.
+    mistaken. If some were on the map before the path began, surveyed or remembered, the agent has
+    its place from the map, which stays.
     """
     is_ours = config.closes_by == "agreement" and config.correct == "heading"
     last = graph.last_segment
@@ -129,11 +130,12 @@ def _is_bound_by_points(graph: Graph, config: Config) -> bool:
         return False
 
     seen = objects_along(graph, last)
-    is_surveyed = any(landmark.surveyed for _, landmark in seen)
+    began_ns = graph.path[0].rows.numpy()[0, STAMP] * 1e9
+    is_given = any(landmark.created_ns < began_ns for _, landmark in seen)
     is_bound = any(
         any(landmark.names) and len(observations.rows.numpy()) for observations, landmark in seen
     )
-    return is_bound and not is_surveyed
+    return is_bound and not is_given
 
 
 def _grown_segment(context: CycleContext, graph: Graph) -> list[str]:

@@ -127,23 +127,21 @@ def _grown(
     landmarks: Literal["buildings", "points"] = "points",
     *,
     bearing_sd_rad: float = 0.02,
-    surveyed: bool = False,
+    began_s: int = 0,
     name: str = "post",
 ) -> bool:
     """Whether a correction is due at the moment that a path without closures, along which a
     landmark is seen, has gained the last of so many places.
     """
     rows = np.zeros((places, len(PathColumn)))
-    rows[:, PathColumn.STAMP_S] = np.arange(places)
+    rows[:, PathColumn.STAMP_S] = began_s + np.arange(places)
     segment = PathSegment(id=segment_id(0), number=0, rows=Matrix.of(rows))
-    viewpoint = Viewpoint(number=0, stamp_s=0.0, step=np.zeros(3), range_gain=0.0)
+    viewpoint = Viewpoint(number=0, stamp_s=began_s, step=np.zeros(3), range_gain=0.0)
     percept = sighting("post", 0.0, 2.0, bearing_sd_rad=bearing_sd_rad, range_sd_m=0.1)
-    post = Object(
-        id=object_id("post"), label="post", names={name: 1.0}, x_m=2.0, y_m=0.0, surveyed=surveyed
-    )
+    post = Object(id=object_id("post"), label="post", names={name: 1.0}, x_m=2.0, y_m=0.0)
     observed = extended(None, viewpoint, percept)
     graph = graph_of(segment, post, observed, *links_of(observed))
-    return _is_due(graph, places - 1, Config(landmarks=landmarks))
+    return _is_due(graph, began_s + places - 1, Config(landmarks=landmarks))
 
 
 def test_a_path_among_points_is_corrected_as_it_grows() -> None:
@@ -162,8 +160,8 @@ def test_a_path_among_beacons_without_bearings_waits_for_closures() -> None:
     assert not _grown(3 * GROWN_PLACES, bearing_sd_rad=float(np.pi))
 
 
-def test_a_surveyed_map_stays_as_the_path_grows() -> None:
-    assert not _grown(3 * GROWN_PLACES, surveyed=True)
+def test_a_map_from_before_the_path_stays_as_the_path_grows() -> None:
+    assert not _grown(3 * GROWN_PLACES, began_s=100.0)
 
 
 def test_a_path_among_points_without_names_waits_for_closures() -> None:
