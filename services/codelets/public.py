@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from cogmap.services.codelets.attention import expectation
 from cogmap.services.codelets.config import Config as CodeletsConfig
-from cogmap.services.codelets.correction.map_correction import FALSE_CLOSURE
+from cogmap.services.codelets.correction.due import FALSE_CLOSURE
 from cogmap.services.codelets.localization import landmarks, localization
 from cogmap.services.codelets.localization.sampling import rejection_mask
 from cogmap.services.codelets.mapping import boundary

@@ -15,7 +15,6 @@ from typing import NamedTuple
 
 import msgspec
 import numpy as np
-from scipy.special import chdtri
 
 from cogmap.estimation import printed_rule
 from cogmap.estimation.alignment import motion_onto
@@ -24,7 +23,6 @@ from cogmap.estimation.hypotheses import Hypotheses
 from cogmap.estimation.least_squares import optimize
 from cogmap.estimation.pairwise_consistency import (
     MAX_VIEW_SD_M,
-    MIN_AGREEING,
     Views,
     consistent,
 )
@@ -63,134 +61,53 @@ from cogmap.schemas.nodes import (
     PathSegment,
 )
 from cogmap.services.codelets.config import SECTION, Config
+from cogmap.services.codelets.correction.due import (
+    FALSE_CLOSURE,
+    GROWN_PLACES,
+    MIN_ROWS,
+    closures_due,
+    grown_segment,
+    is_bound_by_points,
+)
 from cogmap.services.codelets.correction.joint import optimize_jointly
 from cogmap.services.codelets.correction.synapses import replay_of
-from cogmap.services.codelets.mapping.observations import SAME_PLACE_S, Sightings
+from cogmap.services.codelets.mapping.observations import Sightings
 from cogmap.services.codelets.mapping.path import (
     POSE,
-    ROWS,
     STAMP,
     joins_of,
-    objects_along,
     steps_of,
 )
 from cogmap.services.codelets.mapping.ranges import Ranges
 from cogmap.services.codelets.mapping.views import constraints_of, views_of
 
-# Places of the path, 1 m apart, that a loop has at least.
-MIN_ROWS = 10
 # In standard deviations of a pose: of true steps one in 65,000 errs by more.
 IMPOSSIBLE_SD = 5.0
 # At most so many times constraints are computed anew, until headings turn by less (3 degrees).
 MAX_ROUNDS = 3
 SAME_RAD = 0.05
-# A path of so many segments, half a kilometre, is corrected as often as closures come.
-SHORT_SEGMENTS = 8
-# A loop closure is rejected if a true one would misfit as much with a smaller probability.
-FALSE_CLOSURE = 1e-3
-# The path explains a closure whose misfit is at most this share of that at which it is rejected.
-EXPLAINED_MISFIT = 0.1
-# The path is corrected from this share of new closures on that it does not explain.
-UNEXPLAINED_SHARE = 0.1
-# Places of a short path after which the points seen along it correct it: between 3 and 10, which
-# were tried on robot 1 of MRCLAM's sixth set.
-GROWN_PLACES = 5
 
 
 def due(context: CycleContext, graph: Graph, config: Config) -> list[Task]:
-    """Return one task if closures of the present pass were not judged yet, and enough of it are
-    there to agree; unless some were judged just now, a correction waits to be applied, or the path,
-    part of which is sparse, explains them. If one sighting closes a loop, there is one at once.
-
-    Return one about the path's last segment, too, if the points seen along the path bind it, and it
-    has grown.
+    """Return one task about the closures that are to be judged, or else about the path's last
+    segment, if the points seen along the path bind it and it has grown; none while a correction
+    waits to be applied.
     """
     if CORRECTION_ID in graph.nodes:
         return []
 
-    about = [closure.id for closure in _closures_due(context, graph, config)]
+    about = [closure.id for closure in closures_due(context, graph, config)]
     if not about and config.landmarks == "points":
-        grown = _grown_segment(context, graph)
-        about = grown if grown and _is_bound_by_points(graph, config) else []
+        grown = grown_segment(context, graph)
+        about = grown if grown and is_bound_by_points(graph, config) else []
     return [context.task(CODELET.name, about)] if about else []
-
-
-def _is_bound_by_points(graph: Graph, config: Config) -> bool:
-    """Return whether sightings along the path's last segment bind it though no loop closes: each
-    sighting of a point errs by itself. Those of a building's side err alike, and bind one pass to
-    the next alone.
-
-    The points must have been seen in a direction, and have names: of others, which is which may be
-    mistaken. If some were on the map before the path began, surveyed or remembered, the agent has
-    its place from the map, which stays.
-    """
-    is_ours = config.closes_by == "agreement" and config.correct == "heading"
-    last = graph.last_segment
-    if last is None or not is_ours or config.landmarks != "points":
-        return False
-
-    seen = objects_along(graph, last)
-    began_ns = graph.path[0].rows.numpy()[0, STAMP] * 1e9
-    is_given = any(landmark.created_ns < began_ns for _, landmark in seen)
-    is_bound = any(
-        any(landmark.names) and len(observations.rows.numpy()) for observations, landmark in seen
-    )
-    return is_bound and not is_given
-
-
-def _grown_segment(context: CycleContext, graph: Graph) -> list[str]:
-    """Return the path's last segment if the place that the path has gained in this cycle is the
-    last of GROWN_PLACES, or of as many more as the path is longer than a short one.
-    """
-    last = graph.last_segment
-    if last is None:
-        return []
-
-    rows = last.rows.numpy()
-    is_new = abs(context.stamp_ns * 1e-9 - float(rows[-1, STAMP])) < SAME_PLACE_S
-    places = last.number * ROWS + len(rows)
-    length = max(1, graph.count(PathSegment) // SHORT_SEGMENTS)
-    is_whole = places >= MIN_ROWS and places % (GROWN_PLACES * length) == 0
-    return [last.id] if is_new and is_whole else []
-
-
-def _closures_due(context: CycleContext, graph: Graph, config: Config) -> list[LoopClosure]:
-    """Return the closures that are to be judged now."""
-    closures = list(graph.of_kind(LoopClosure))
-    unjudged = [closure for closure in closures if closure.accepted is None]
-    is_sighted = any(not closure.range_alone for closure in unjudged)
-    if config.closes_by == "sighting" and is_sighted:
-        return unjudged
-
-    since_ns = context.stamp_ns - config.revisit_s * 1e9
-    late = [closure for closure in closures if closure.to_ns > since_ns]
-    fresh = [closure for closure in late if closure.accepted is None]
-    is_heard = any(closure.range_alone for closure in fresh)
-    if not fresh or (len(late) < MIN_AGREEING and not is_heard):
-        return []
-
-    # Correcting a path takes as long as it is, so it is done as much less often: it takes the same
-    # share of a long drive as of a short one.
-    judged_ns = [closure.to_ns for closure in closures if closure.accepted is not None]
-    length = max(1.0, graph.count(PathSegment) / SHORT_SEGMENTS)
-    spacing_ns = config.closure_spacing_s * length * 1e9
-    if judged_ns and context.stamp_ns < max(judged_ns) + spacing_ns:
-        return []
-
-    path = graph.path
-    is_corrected = any(closure.accepted for closure in closures)
-    is_long = any(segment.is_sparse for segment in path)
-    if is_corrected and is_long and not is_heard and may_be_deferred(fresh, rows_of(path)):
-        return []
-
-    return fresh
 
 
 def run(task: Task, graph: Graph, config: Config) -> Answer:
     """Return what becomes of all closures, the correction of the path, and its replay."""
     rows = rows_of(graph.of_kind(PathSegment))
     closures = sorted(graph.of_kind(LoopClosure), key=lambda closure: closure.to_ns)
-    is_bound = _is_bound_by_points(graph, config)
+    is_bound = is_bound_by_points(graph, config)
     if len(rows) < 2 or not (closures or is_bound):
         return Answer()
 
@@ -265,21 +182,6 @@ CODELET = Codelet(
     config=Config,
     section=SECTION,
 )
-
-
-def may_be_deferred(closures: list[LoopClosure], rows: Floats) -> bool:
-    """Return whether the path `rows`, as it is believed, explains all but a share of the closures,
-    or all but so few that they close no loop.
-    """
-    poses = rows[:, POSE]
-    views = views_of([each for each in closures if not each.range_alone], rows)
-    constraints = constraints_of(views, poses)
-    squared = mahalanobis2(residuals(poses, constraints), constraints.information)
-
-    degrees = np.where(views.has_heading, 3, 2)
-    misfit = squared / chdtri(degrees, FALSE_CLOSURE)
-    unexplained = int((misfit > EXPLAINED_MISFIT).sum())
-    return unexplained < max(MIN_AGREEING, UNEXPLAINED_SHARE * len(closures))
 
 
 class Judgement(NamedTuple):

@@ -21,7 +21,8 @@ from cogmap.schemas.nodes import (
 )
 from cogmap.schemas.sensing import Percepts
 from cogmap.services.codelets.config import Config
-from cogmap.services.codelets.correction.map_correction import CODELET, GROWN_PLACES, MIN_ROWS
+from cogmap.services.codelets.correction.due import GROWN_PLACES, MIN_ROWS
+from cogmap.services.codelets.correction.map_correction import CODELET
 from cogmap.services.codelets.mapping.observations import Viewpoint, extended
 from cogmap.services.codelets.mapping.path import links_of
 from cogmap.services.player.public import sighting
