@@ -70,7 +70,7 @@ def test_rules_override_the_file_and_settings_override_rules(tmp_path: Path) -> 
 
 
 def test_rules_that_there_are_not_are_named() -> None:
-    with pytest.raises(UsageError, match="rules 'papers': choose paper or cogmap"):
+    with pytest.raises(UsageError, match="rules 'papers': choose paper or spiking or cogmap"):
         settings_of({"rules": "papers"})
 
 
