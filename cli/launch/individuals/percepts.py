@@ -34,7 +34,8 @@ class Sight:
 class PerceptTally:
     """Follows percepts, deltas and true poses. `seen` has all that was perceived, but for places to
     charge at; `entered` has the percepts that came into the agent's graph, with what they were
-    given to. `poses` are the true x_m, y_m and heading_rad by stamp.
+    given to. `poses` are the true x_m, y_m and heading_rad by stamp. A view's percepts and their
+    delta are from two processes: either may arrive first.
 
     A percept is given to an object by its INSTANCE link, also by one that comes later. One without
     a link is given to the object that is made of it: the one of its label that enters the map in
@@ -43,11 +44,27 @@ class PerceptTally:
 
     def __init__(self) -> None:
         self.seen: list[Sight] = []
-        self.entered: list[Sight] = []
         self.poses: dict[int, tuple[float, float, float]] = {}
+        self._entered: list[Sight] = []
         self._newest: dict[str, Sight] = {}
         self._known: set[str] = set()
         self._perceived: dict[tuple[int, float, float], Sight] = {}
+
+    @property
+    def entered(self) -> list[Sight]:
+        """Return the percepts that came into the agent's graph, each with its outline, if that was
+        perceived.
+        """
+        found = []
+        for sight in self._entered:
+            key = (sight.stamp_ns, sight.bearing_rad, sight.range_m)
+            perceived = self._perceived.get(key, sight)
+            outlined = replace(
+                sight, outline_px=perceived.outline_px, calibration=perceived.calibration
+            )
+            found.append(outlined)
+
+        return found
 
     def update(self, message: Message) -> None:
         """Take account of one message; one of another kind is ignored."""
@@ -89,15 +106,13 @@ class PerceptTally:
                 self._give_maker(node, delta.stamp_ns)
 
     def _on_percept(self, node: Percept, stamp_ns: int) -> None:
-        key = (stamp_ns, node.bearing_rad, node.range_m)
-        perceived = self._perceived.get(key, Sight(*key))
-        sight = replace(perceived, label=node.label)
+        sight = Sight(stamp_ns, node.bearing_rad, node.range_m, label=node.label)
         before = self._newest.get(node.id)
         if before is not None and replace(before, object="") == sight:
             return
 
         self._newest[node.id] = sight
-        self.entered.append(sight)
+        self._entered.append(sight)
 
     def _give(self, percept: str, target: str) -> None:
         sight = self._newest.get(percept)

@@ -12,6 +12,7 @@ from cogmap.bus.codec import Envelope
 from cogmap.cli.launch.drive_metrics import drive_metrics, headline
 from cogmap.cli.launch.individuals.buildings import NOTHING, Buildings
 from cogmap.cli.launch.individuals.judge import SEEN_VIEWS, BuildingMetrics
+from cogmap.cli.launch.individuals.percepts import PerceptTally
 from cogmap.cli.launch.tally import Tally
 from cogmap.errors import NoAnswerError
 from cogmap.graph.graph import Graph
@@ -312,3 +313,18 @@ def test_an_outline_without_an_area_shows_nothing() -> None:
     pose = np.array([100.0, 50.0, math.pi / 2])
 
     assert Buildings(TOWN).shown_in(pose, [(150, 100), (160, 100)], calibration()) == NOTHING
+
+
+def test_a_percept_has_its_outline_whichever_of_two_messages_comes_first() -> None:
+    outline_px = [(0, 0), (4, 0), (4, 4)]
+    node = Percept(id="inn", label="inn", activation=1.0, bearing_rad=0.1, range_m=12.0)
+    delta = Delta(stamp_ns=stamp_ns(1), version=1, cycle=1, phase=Phase.PERCEPTS, operations=[node])
+    view = percepts(1, percept("inn", 0.1, 12.0, outline_px=outline_px))
+
+    for messages in ((view, delta), (delta, view)):
+        tally = PerceptTally()
+        for message in messages:
+            tally.update(message)
+
+        (entered,) = tally.entered
+        assert list(entered.outline_px) == outline_px
