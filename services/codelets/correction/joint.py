@@ -36,9 +36,11 @@ def optimize_jointly(
     border, of one whose size nobody knows, moves with the agent, and would bend the path.
     """
     # Ranges are led from what is believed, which they have corrected before: each correction begins
-    # where the last one ended.
+    # where the last one ended. So are points along a path without a loop, which path integration
+    # alone would lead into another minimum.
     is_heard_alone = len(heard.place) > 0 and not len(seen.place)
-    poses = graph.poses if is_heard_alone else optimize_windings(graph)
+    is_open = config.landmarks == "points" and not len(graph.closures.i)
+    poses = graph.poses if is_heard_alone or is_open else optimize_windings(graph)
     if not len(seen.place) and not is_heard_alone:
         return poses, 1
 

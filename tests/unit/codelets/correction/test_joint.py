@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -113,3 +114,19 @@ def test_a_path_without_sightings_is_optimized_alone() -> None:
 
     poses, _ = optimize_jointly(graph, nothing, NOTHING_HEARD, Config())
     assert poses == pytest.approx(optimize(graph))
+
+
+def test_points_along_an_open_path_correct_what_is_believed_not_path_integration() -> None:
+    """Headings drift by 8 rad in two laps: so far off, the least squares end in another minimum."""
+    truth = _graph(_steps(2)).poses
+    steps = _steps(2, turn_error_rad=0.05)
+    steps.information[:, 2, 2] = 1 / 1e-3
+    drifted = _graph(steps)
+    believed = replace(drifted, poses=truth)
+    config = Config(landmarks="points")
+
+    from_belief, _ = optimize_jointly(believed, _sightings(truth), NOTHING_HEARD, config)
+    from_integration, _ = optimize_jointly(drifted, _sightings(truth), NOTHING_HEARD, config)
+
+    assert mean_distance_m(from_belief, truth) < 1.5
+    assert mean_distance_m(from_integration, truth) > 2.5
