@@ -29,7 +29,12 @@ from cogmap.experiments.city_maps.measure import (
     jobs,
     measure,
 )
-from cogmap.experiments.city_maps.metrics import camera_metrics, fit_metrics, map_metrics
+from cogmap.experiments.city_maps.metrics import (
+    camera_metrics,
+    drive_metrics,
+    fit_metrics,
+    map_metrics,
+)
 from cogmap.experiments.city_maps.sources import folder, from_osm, grown_environments
 from cogmap.parallel import Progress
 from cogmap.services.sim.odometry import Noise
@@ -43,6 +48,7 @@ Examples:
   cogmap experiment city-maps --all extracts          every extract in a folder, against people
   cogmap experiment city-maps --all extracts --noise-drawn leg
   cogmap experiment city-maps --maps 4 --human examples/human_maps.csv
+  cogmap experiment city-maps --driven --maps 2 --traversals 1
 """
 TRAVERSALS_OF_ALL = 1
 
@@ -102,6 +108,12 @@ TRAVERSALS_OF_ALL = 1
     help="Compare with maps that people drew: a CSV file of map, person, building, x and y, as "
     "buildings.csv among the results has them.",
 )
+@click.option(
+    "--driven",
+    is_flag=True,
+    help="Let the agent drive itself, by its own action selection and motor programs, from one "
+    "given turn or building of the tour to the next. It is led along the tour otherwise.",
+)
 @common_options
 def city_maps(
     common: Common,
@@ -113,6 +125,7 @@ def city_maps(
     noise_drawn: Drawn,
     fit: bool,
     human: Path | None,
+    driven: bool,
 ) -> None:
     """Run experiment 2, figure 8: an agent learns maps of cities, with their loops closed and not.
 
@@ -122,6 +135,8 @@ def city_maps(
     """
     if fit and noise is not None:
         raise UsageError("--fit and --noise: give one of them")
+    if driven:
+        _check_driven(common, noise_drawn)
     out = results.folder_for(NAME, common.out)
     rules = results.show_rules(common)
     with bar("choosing buildings") as progress:
@@ -148,11 +163,13 @@ def city_maps(
     kept = _kept(out)
     with bar("traversals") as progress:
         budget = Budget(
-            often, common.seed, common.processes, progress, common.rules, kept, noise_drawn
+            often, common.seed, common.processes, progress, common.rules, kept, noise_drawn, driven
         )
         found = measure(places, chosen, budget)
 
     metrics = map_metrics(found, chosen) | rules | {"noise_drawn": noise_drawn}
+    if driven:
+        metrics |= drive_metrics(found)
     if fits:
         metrics |= fit_metrics(found, fits, len(to))
     if people_km2 is not None:
@@ -172,6 +189,18 @@ def city_maps(
     _save(out, found, metrics, common)
     shutil.rmtree(kept)
     live.check(differing)
+
+
+def _check_driven(common: Common, noise_drawn: Drawn) -> None:
+    """Raise UsageError for options that take an agent that is led."""
+    led_only = {
+        "--cameras": common.cameras,
+        "--live": common.live,
+        f"--noise-drawn {LEG}": noise_drawn == LEG,
+    }
+    for option, is_given in led_only.items():
+        if is_given:
+            raise UsageError(f"{option} is of agents that are led: leave it or --driven out")
 
 
 def _kept(out: Path) -> Path:

@@ -57,31 +57,36 @@ def sections(
     """
     correction = settings(method, SPEED_M_S / FRAME_HZ, rules)
     line_m = environment.line(tour.start, tour.backward, LEAD_M, OVERRUN_M)
-    landmarks = [
-        {"name": name, "x_m": x_m, "y_m": y_m}
-        for name, (x_m, y_m) in zip(
-            environment.names, environment.buildings_m.tolist(), strict=True
-        )
-    ]
-    sim = {
-        "seed": tour.seed,
-        "trajectory": {
-            "line_m": line_m.tolist(),
-            "landmarks": landmarks,
-            "speed_m_s": SPEED_M_S,
-            "noise_drawn": drawn,
-        },
-        "noise": msgspec.structs.asdict(noise),
-        "percepts": {"field_of_view_rad": FIELD_OF_VIEW_RAD},
-        "frame_hz": FRAME_HZ,
+    configured = senses(tour.seed, noise, FRAME_HZ)
+    configured["sim"]["trajectory"] = {
+        "line_m": line_m.tolist(),
+        "landmarks": landmarks(environment),
+        "speed_m_s": SPEED_M_S,
+        "noise_drawn": drawn,
     }
-    workspace = {"cell_m": CELL_M, "base_level_decay": 0.0}
+    return {**configured, **correction}
 
+
+def landmarks(environment: Environment) -> list[dict[str, str | float]]:
+    """Return the buildings of an environment as landmarks of a configuration."""
+    places_m = environment.buildings_m.tolist()
+    return [
+        {"name": name, "x_m": x_m, "y_m": y_m}
+        for name, (x_m, y_m) in zip(environment.names, places_m, strict=True)
+    ]
+
+
+def senses(seed: int, noise: Noise, frame_hz: int) -> Sections:
+    """Return how an agent senses a city, and how fine its map is, without where it is."""
     return {
         "run": {"lockstep": True, "participants": dict.fromkeys(MODULES, 1)},
-        "sim": sim,
-        "workspace": workspace,
-        **correction,
+        "sim": {
+            "seed": seed,
+            "noise": msgspec.structs.asdict(noise),
+            "percepts": {"field_of_view_rad": FIELD_OF_VIEW_RAD},
+            "frame_hz": frame_hz,
+        },
+        "workspace": {"cell_m": CELL_M, "base_level_decay": 0.0},
     }
 
 

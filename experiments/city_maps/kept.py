@@ -10,19 +10,22 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from cogmap.experiments.city_maps.drive import traverse
+from cogmap.experiments.city_maps import drive, self_driven
+from cogmap.experiments.city_maps.guide import Outcome
 from cogmap.experiments.city_maps.observer import Traversal
 from cogmap.runtime.config import Sections
 from cogmap.version import VERSION
 
 SUFFIX = ".npz"
 ALONE = "alone:"
+OUTCOME = "outcome"
 
 
 def traverse_once(configured: Sections, folder: Path | None) -> Traversal:
-    """Drive as `traverse` does, unless a file in `folder` has that traversal, and keep it there;
-    without a folder nothing is kept.
+    """Drive as `drive.traverse` does, or `self_driven.traverse` if there is a guide, unless a file
+    in `folder` has that traversal, and keep it there; without a folder nothing is kept.
     """
+    traverse = self_driven.traverse if self_driven.GUIDE in configured else drive.traverse
     if folder is None:
         return traverse(configured)
 
@@ -46,6 +49,8 @@ def _write(path: Path, found: Traversal) -> None:
     columns: dict[str, Any] = asdict(found)
     for name, alone_m in columns.pop("alone_m").items():
         columns[ALONE + name] = alone_m
+    if columns.pop(OUTCOME) is not None:
+        columns[OUTCOME] = np.array(msgspec.json.encode(found.outcome).decode())
 
     partial = path.with_suffix(".partial")
     with partial.open("wb") as file:
@@ -59,4 +64,7 @@ def _read(path: Path) -> Traversal:
 
     alone = [name for name in arrays if name.startswith(ALONE)]
     alone_m = {name.removeprefix(ALONE): arrays.pop(name) for name in alone}
-    return Traversal(alone_m=alone_m, **arrays)
+    outcome = None
+    if OUTCOME in arrays:
+        outcome = msgspec.json.decode(str(arrays.pop(OUTCOME)), type=Outcome)
+    return Traversal(alone_m=alone_m, outcome=outcome, **arrays)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from cogmap.estimation.alignment import similar_to
 from cogmap.experiments import rendered
+from cogmap.experiments.city_maps import self_driven
 from cogmap.experiments.city_maps.correction import METHODS
 from cogmap.experiments.city_maps.drive import COGNITION, VIEW, Tour, driven, sections
 from cogmap.experiments.city_maps.environment import BUILDINGS, Environment
+from cogmap.experiments.city_maps.guide import Outcome
 from cogmap.experiments.city_maps.kept import traverse_once
 from cogmap.experiments.city_maps.observer import Traversal
 from cogmap.experiments.city_maps.streets import Points
@@ -30,7 +32,7 @@ NOISE = Noise(speed=0.1, turn=0.1, drift_rad_per_sqrt_m=0.0)
 @dataclass(frozen=True, eq=False)
 class Job:
     """One traversal of one environment, by a preset of rules, with factors of noise that are
-    `drawn` anew for each view or leg.
+    `drawn` anew for each view or leg. The agent drives itself if it is `self_driven`.
     """
 
     environment: Environment
@@ -39,13 +41,14 @@ class Job:
     seed: int
     rules: str = OURS
     drawn: Drawn = VIEW
+    self_driven: bool = False
 
 
 @dataclass(frozen=True)
 class Budget:
     """How often each environment is traversed, from which seed, on how many processes, by which
-    preset of rules, in which folder traversals are kept as they end, if any, and how often factors
-    of noise are `drawn` anew.
+    preset of rules, in which folder traversals are kept as they end, if any, how often factors of
+    noise are `drawn` anew, and whether agents drive themselves.
     """
 
     traversals: int
@@ -55,6 +58,7 @@ class Budget:
     rules: str = OURS
     kept: Path | None = None
     drawn: Drawn = VIEW
+    self_driven: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +79,7 @@ class Learned:
     2).
 
     `error_km2` is also that by path integration alone: of WHEELS and, with cameras, of FUSED
-    self-motion.
+    self-motion. `outcomes` are how the drives ended, none if the agent was led.
     """
 
     error_km2: dict[str, float]
@@ -83,6 +87,7 @@ class Learned:
     buildings_m: dict[str, Points]
     path_m: dict[str, Points]
     road_m: dict[str, Points]
+    outcomes: dict[str, Outcome] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +123,13 @@ class CityMap:
 def measure(environments: Sequence[Environment], noise: Noise, budget: Budget) -> list[CityMap]:
     """Measure all environments: the same seed gives the same, whatever the number of processes."""
     every = jobs(
-        environments, noise, budget.traversals, budget.seed, budget.rules, drawn=budget.drawn
+        environments,
+        noise,
+        budget.traversals,
+        budget.seed,
+        budget.rules,
+        drawn=budget.drawn,
+        self_driven=budget.self_driven,
     )
     drives = [
         Drive(configured, budget.kept)
@@ -152,6 +163,7 @@ def jobs(
     rules: str = OURS,
     *,
     drawn: Drawn = VIEW,
+    self_driven: bool = False,
 ) -> list[Job]:
     """Return all traversals of each environment, one environment after the other."""
     found = []
@@ -159,7 +171,7 @@ def jobs(
     for place, environment in enumerate(environments):
         own_seed = seed * 1000 + place
         for number in range(traversals):
-            found.append(Job(environment, number, noise, own_seed, rules, drawn))
+            found.append(Job(environment, number, noise, own_seed, rules, drawn, self_driven))
 
     return found
 
@@ -184,6 +196,11 @@ def configurations(job: Job) -> dict[str, Sections]:
     found = {}
 
     for method in METHODS:
+        if job.self_driven:
+            found[method] = self_driven.sections(
+                job.environment, tour, job.noise, method, job.rules
+            )
+            continue
         found[method] = sections(
             job.environment, tour, job.noise, method, job.rules, drawn=job.drawn
         )
@@ -229,4 +246,5 @@ def _learned(job: Job, maps: Mapping[str, Traversal]) -> Learned:
         buildings_m=buildings_m,
         path_m={method: one.path_m for method, one in maps.items()},
         road_m={method: one.road_m for method, one in maps.items()},
+        outcomes={name: one.outcome for name, one in maps.items() if one.outcome is not None},
     )

@@ -123,6 +123,44 @@ def fit_metrics(maps: Sequence[CityMap], fits: Mapping[Drawn, Fit], fitted_maps:
     return metrics
 
 
+def drive_metrics(maps: Sequence[CityMap]) -> Metrics:
+    """Return how agents that drove themselves came to their goals, by method: goals and buildings
+    reached and given, the way driven over that of the tour as far as it was driven, on the mean
+    over the drives that reached a goal, how many drives ended by time before the last goal, and how
+    many with an agent that took itself for lost.
+
+    Each drive that ended so has a key of its own, with its map and its number.
+    """
+    metrics: Metrics = {"agents": "driven"}
+    for method in METHODS:
+        name = NAMES[method]
+        outcomes = [one.outcomes[method] for city in maps for one in city.learned]
+        ways = [each.driven_m / each.tour_m for each in outcomes if each.tour_m > 0]
+        metrics |= {
+            f"goals_reached_{name}": float(sum(each.stops for each in outcomes)),
+            f"buildings_reached_{name}": float(sum(each.buildings for each in outcomes)),
+            f"way_over_tour_{name}": float(np.mean(ways)) if ways else float("nan"),
+            f"drives_unfinished_{name}": float(sum(not each.is_finished for each in outcomes)),
+            f"drives_lost_{name}": float(sum(each.is_lost for each in outcomes)),
+            f"drive_{name}_s": float(np.mean([each.duration_s for each in outcomes])),
+        }
+
+    # All methods are given the same goals.
+    metrics["goals_given"] = float(sum(each.stops_given for each in outcomes))
+    metrics["buildings_given"] = float(sum(each.buildings_given for each in outcomes))
+    for map_number, city in enumerate(maps, start=1):
+        for number, one in enumerate(city.learned, start=1):
+            for method, each in one.outcomes.items():
+                key = f"map_{map_number:02d}_traversal_{number:02d}_{NAMES[method]}"
+                if not each.is_finished:
+                    ended = f"{each.stops} of {each.stops_given} goals when its time was up"
+                    metrics[f"{key}_unfinished"] = ended
+                if each.is_lost:
+                    metrics[f"{key}_lost"] = "took itself for lost in the end"
+
+    return metrics
+
+
 def _ratio(name: str, above: Errors, below: Errors) -> Metrics:
     """Return the ratio of two means over the maps, and its standard error `_se`, by how much the
     maps differ, to first order; 0 for one map.

@@ -8,6 +8,7 @@ import numpy as np
 
 from cogmap.errors import CogmapError
 from cogmap.experiments import reading
+from cogmap.experiments.city_maps.guide import Outcome
 from cogmap.experiments.city_maps.streets import Points
 from cogmap.experiments.dead_reckoning import DeadReckoning
 from cogmap.experiments.reading import Pose
@@ -29,7 +30,8 @@ class Traversal:
     `path_m` (n, 2) is the path as the map has it in the end, `buildings_m` (8, 2) has NaN for one
     that is not on the map, and `road_m` (k, 2) are the cells that are road. `alone_m` has the
     buildings (8, 2) where they would be by path integration alone, of the WHEELS and, where they
-    are fused with views, of FUSED self-motion.
+    are fused with views, of FUSED self-motion. `outcome` is how the drive ended if the agent drove
+    itself.
     """
 
     believed: Points
@@ -38,6 +40,7 @@ class Traversal:
     buildings_m: Points
     road_m: Points
     alone_m: dict[str, Points]
+    outcome: Outcome | None = None
 
     @property
     def missing(self) -> int:

@@ -13,6 +13,7 @@ from cogmap.services.sim.battery import Battery
 from cogmap.services.sim.layout import towns
 from cogmap.services.sim.layout.catalogue import CATALOGUE
 from cogmap.services.sim.layout.closures import Closure
+from cogmap.services.sim.layout.network import StreetNetwork
 from cogmap.services.sim.layout.place import Place
 from cogmap.services.sim.layout.removals import Removal
 from cogmap.services.sim.odometry import Noise
@@ -31,7 +32,7 @@ Side = Annotated[int, msgspec.Meta(ge=64, le=1024)]
 
 
 class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=True):
-    """A town with a robot in it, or a trajectory that a robot follows."""
+    """A town or a street network with a robot in it, or a trajectory that a robot follows."""
 
     seed: Annotated[
         int,
@@ -113,6 +114,13 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Trajectory | None,
         msgspec.Meta(description="Line that the robot follows in lockstep, instead of a town."),
     ] = None
+    streets: Annotated[
+        StreetNetwork | None,
+        msgspec.Meta(
+            description="Streets without houses that the robot drives on, sensed by percepts, "
+            "instead of a town."
+        ),
+    ] = None
 
     @property
     def renders(self) -> bool:
@@ -154,6 +162,12 @@ def check(config: Config, run: Run) -> None:
     if config.removals and config.sensing != "percepts":
         raise ConfigError(
             '[sim] removals: cameras cannot see that a building is gone: set sensing to "percepts"'
+        )
+
+    if config.streets is not None and (config.sensing != "percepts" or config.trajectory):
+        raise ConfigError(
+            "[sim] streets without houses are sensed by percepts, and have no trajectory: set "
+            'sensing to "percepts" and leave trajectory out'
         )
 
     if config.renders and find_spec("pybullet") is None:

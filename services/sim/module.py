@@ -10,9 +10,11 @@ from cogmap.services.sim.battery import Battery
 from cogmap.services.sim.config import ODOMETRY_HZ, Config, check, place_of
 from cogmap.services.sim.drivers.kinematic import KinematicRobot
 from cogmap.services.sim.drivers.line_follower import LineFollower
+from cogmap.services.sim.layout.network import StreetNetwork
 from cogmap.services.sim.lockstep import REPEAT_CHECK_NS, Lockstep
 from cogmap.services.sim.percept_level.line_sensors import LineSensors
 from cogmap.services.sim.percept_level.senses import PerceptSenses
+from cogmap.services.sim.percept_level.street_sensors import StreetSensors
 from cogmap.services.sim.percept_level.surroundings import Surroundings
 from cogmap.services.sim.percept_level.town_sensors import TownSensors
 from cogmap.services.sim.real_time import RealTime
@@ -48,6 +50,8 @@ def build(config: Config, instance: str = "sim", run: Run = REAL_TIME) -> Module
             simulation = camera_level.driven(config, battery, ticks_per_frame)
         else:
             simulation = camera_level.scripted(config, trajectory, ticks_per_frame)
+    elif config.streets is not None:
+        simulation = on_streets(config, config.streets)
     elif trajectory is None:
         simulation = driven(config, battery, ticks_per_frame)
     else:
@@ -85,6 +89,16 @@ def driven(config: Config, battery: Battery | None, ticks_per_frame: int) -> Sim
     return Simulation(
         config, robot, senses, place=place, battery=battery, ticks_per_frame=ticks_per_frame
     )
+
+
+def on_streets(config: Config, network: StreetNetwork) -> Simulation:
+    """Return a robot that drives itself along the streets of `network`, a view each tick."""
+    place = network.place()
+    surroundings = Surroundings(place)
+    robot = KinematicRobot(place.start, surroundings, config.noise, config.seed)
+    mount = calibration(config.width_px, config.height_px)
+    sensors = StreetSensors(network, place, surroundings, config.percepts, mount, seed=config.seed)
+    return Simulation(config, robot, PerceptSenses(sensors, config.percepts, config.seed))
 
 
 def scripted(config: Config, trajectory: Trajectory) -> Simulation:

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 
 import numpy as np
 
+from cogmap.geometry.arrays import Floats
 from cogmap.geometry.se2 import transform_to
 from cogmap.schemas.sensing import Building, Pose, Street, TrueTown
 from cogmap.services.sim.drivers.line_follower import LineFollower
 from cogmap.services.sim.percept_level.percepts import PerceptErrors, PerceptSim
 from cogmap.services.sim.percept_level.senses import View
-from cogmap.services.sim.trajectory import Trajectory
+from cogmap.services.sim.trajectory import Landmark, Trajectory
 
 ROAD_AHEAD_M = (0.0, 3.0, 6.0, 9.0)
 # From the line to the houses beside it; between the points of a line of sight that are checked.
 STREET_HALF_WIDTH_M = 12.0
 SIGHT_STEP_M = 4.0
-_NOTHING = np.zeros(0, np.float32)
+NOTHING = np.zeros(0, np.float32)
 
 
 class LineSensors:
@@ -43,8 +44,7 @@ class LineSensors:
             landmark = self._trajectory.landmarks[number]
             front_m = self._line.nearest(np.array([[landmark.x_m, landmark.y_m]]))[0]
 
-            steps = max(2, math.ceil(math.dist(eye_m, front_m) / SIGHT_STEP_M))
-            sight_m = eye_m + np.linspace(0, 1, steps)[:, None] * (front_m - eye_m)
+            sight_m = line_of_sight_m(eye_m, front_m)
             aside_m = sight_m - self._line.nearest(sight_m)
             if (np.hypot(aside_m[:, 0], aside_m[:, 1]) <= STREET_HALF_WIDTH_M).all():
                 visible.append(number)
@@ -57,8 +57,8 @@ class LineSensors:
 
         at = np.array([pose.x_m, pose.y_m, pose.heading_rad])
         return View(
-            bearing_rad=_NOTHING,
-            range_m=_NOTHING,
+            bearing_rad=NOTHING,
+            range_m=NOTHING,
             road_m=transform_to(at, np.array(ahead)),
             boundary_m=np.zeros((0, 2), np.float32),
             objects=self._percepts.perceive(pose, visible),
@@ -71,16 +71,30 @@ class LineSensors:
         """Return the line as a street, and its landmarks as buildings."""
         line_m = self._trajectory.line_m
         street = Street(name="way", line_m=line_m, width_m=2 * STREET_HALF_WIDTH_M)
-        buildings = []
-        for landmark in self._trajectory.landmarks:
-            buildings.append(
-                Building(
-                    name=landmark.name,
-                    pose=Pose(x_m=landmark.x_m, y_m=landmark.y_m, heading_rad=0.0),
-                    width_m=landmark.width_m,
-                    depth_m=landmark.width_m,
-                    height_m=landmark.height_m,
-                )
-            )
-
+        buildings = buildings_of(self._trajectory.landmarks)
         return TrueTown(seed=self._seed, streets=[street], buildings=buildings)
+
+
+def line_of_sight_m(eye_m: Floats, front_m: Floats) -> Floats:
+    """Return (n, 2) points from the eye to a landmark's front, SIGHT_STEP_M apart at most."""
+    steps = max(2, math.ceil(math.dist(eye_m, front_m) / SIGHT_STEP_M))
+    share = np.linspace(0, 1, steps)[:, None]
+    sight_m: Floats = eye_m + share * (front_m - eye_m)
+    return sight_m
+
+
+def buildings_of(landmarks: Iterable[Landmark]) -> list[Building]:
+    """Return landmarks as buildings, as deep as they are wide."""
+    buildings = []
+    for landmark in landmarks:
+        buildings.append(
+            Building(
+                name=landmark.name,
+                pose=Pose(x_m=landmark.x_m, y_m=landmark.y_m, heading_rad=0.0),
+                width_m=landmark.width_m,
+                depth_m=landmark.width_m,
+                height_m=landmark.height_m,
+            )
+        )
+
+    return buildings
