@@ -34,6 +34,7 @@ VERBS = {
         "cogmap.cli.messages.interface:interface",
         "List and show the types of messages.",
     ),
+    "keys": ("cogmap.cli.keys.command:keys", "Make keys, by which the bus knows who is who."),
     "log": ("cogmap.cli.log.command:log", "Record, inspect, draw, replay and compare logs."),
     "memory": (
         "cogmap.cli.memory.command:memory",

@@ -6,6 +6,7 @@ import time
 
 import click
 
+from cogmap.bus.access.subjects import ACTS
 from cogmap.bus.interface import Arrival, Bus
 from cogmap.cli.topic.observing import observing
 from cogmap.cli.topic.publishing import Publisher
@@ -38,7 +39,7 @@ def time_() -> None:
 @agent_option
 def pause(connect: str, agent: str) -> None:
     """Let time stand."""
-    with observing(connect, agent, "time") as bus:
+    with observing(connect, agent, "time", ACTS) as bus:
         ask(bus, Pause(is_paused=True), ANSWER_S)
     click.echo("time stands: `cogmap time resume` lets it pass")
 
@@ -48,7 +49,7 @@ def pause(connect: str, agent: str) -> None:
 @agent_option
 def resume(connect: str, agent: str) -> None:
     """Let time pass again."""
-    with observing(connect, agent, "time") as bus:
+    with observing(connect, agent, "time", ACTS) as bus:
         ask(bus, Pause(is_paused=False), ANSWER_S)
     click.echo("time passes")
 
@@ -59,7 +60,7 @@ def resume(connect: str, agent: str) -> None:
 @agent_option
 def step(views: int, connect: str, agent: str) -> None:
     """Let time pass until so many more VIEWS have been sensed, then stand."""
-    with observing(connect, agent, "time") as bus:
+    with observing(connect, agent, "time", ACTS) as bus:
         # What is asked again would be done again: by then whoever answers is known to listen.
         ask(bus, Pause(is_paused=True), ANSWER_S)
         ask(bus, Pause(is_paused=True, views=views), ANSWER_S, try_s=ANSWER_S)
@@ -74,7 +75,7 @@ def reset(connect: str, agent: str) -> None:
 
     Time goes on, and the agent keeps what it knows. Nothing tells it of this but its senses.
     """
-    with observing(connect, agent, "time") as bus:
+    with observing(connect, agent, "time", ACTS) as bus:
         times = carry(bus, ANSWER_S)
     click.echo(f"the robot is at its start again; so often by now: {times}")
 

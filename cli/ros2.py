@@ -6,6 +6,7 @@ import re
 
 import click
 
+from cogmap.bus.access.subjects import ROS2
 from cogmap.bus.discovery import Role
 from cogmap.cli.options import FiniteRange
 from cogmap.cli.topic.observing import inspect_system
@@ -17,6 +18,7 @@ from cogmap.ros2.process import Place, run_bridge
 from cogmap.ros2.rmw.keys import MAX_DOMAIN
 from cogmap.ros2.rmw.types import DISTROS, NEWEST
 from cogmap.ros2.steering import Limits
+from cogmap.runtime import environment
 from cogmap.runtime.process import Stop
 from cogmap.runtime.program import agent_option, connect_option, tied_option
 from cogmap.schemas import topics
@@ -222,7 +224,11 @@ def ros2(
     cmd_vel, pose with covariance, path, plan, map, objects as markers, tf. The robot is stopped
     when no command has come for --hold seconds, and at the end.
     """
-    publishing = inspect_system(connect, agent).doing(Role.PUBLISHES, topics.STEREO)
+    if ros_connect is None and environment.keys(ROS2) is not None:
+        raise UsageError(
+            "with keys our router is for our modules alone: name that of ROS 2 with --ros-connect"
+        )
+    publishing = inspect_system(connect, agent, (ROS2,)).doing(Role.PUBLISHES, topics.STEREO)
     if publishing:
         listed = ", ".join(process.name for process in publishing)
         raise UsageError(

@@ -7,6 +7,7 @@ from contextlib import suppress
 
 import click
 
+from cogmap.bus.access.subjects import ACTS
 from cogmap.bus.interface import Arrival, Bus
 from cogmap.cli.options import json_option
 from cogmap.cli.printing import print_json
@@ -99,7 +100,7 @@ def change(closure: StreetClosure, connect: str, agent: str) -> None:
     that the town does not have, and NoAnswerError.
     """
     done = "closed" if closure.closed else "open"
-    with observing(connect, agent, "street") as bus:
+    with observing(connect, agent, "street", ACTS) as bus:
         towns = Towns(bus)
         check_known(towns.next(ANSWER_S), closure.street)
         publisher = Publisher(bus, topics.STREET_CLOSURE)

@@ -19,6 +19,10 @@ class NoRouterError(UsageError):
     """No Zenoh router answered in time."""
 
 
+class AccessError(UsageError):
+    """Keys are missing, wrong or expired, or do not allow what is asked for."""
+
+
 class PortInUseError(UsageError):
     """Another process listens where the router should."""
 

@@ -11,12 +11,14 @@ from pathlib import Path
 import click
 from aiohttp import web
 
+from cogmap.bus.access.subjects import ACTS_OR_READS
 from cogmap.cli.dashboard.live import Live
 from cogmap.cli.dashboard.playback import Playback
 from cogmap.cli.dashboard.server import Dashboard
 from cogmap.cli.dashboard.source import Source
 from cogmap.cli.options import DASHBOARD_PORT
 from cogmap.errors import PortInUseError
+from cogmap.runtime import environment
 from cogmap.runtime.company import company_at
 from cogmap.runtime.process import Stop, give_way
 from cogmap.runtime.program import (
@@ -77,7 +79,9 @@ def dashboard(
     source: Source = Live(connect, agent) if log is None else Playback(log)
     stop = Stop(tied)
     try:
-        with company_at(connect, agent, "" if log is not None else ends_with) as is_alone:
+        company = "" if log is not None else ends_with
+        keys = environment.keys(*ACTS_OR_READS) if company else None
+        with company_at(connect, agent, company, keys) as is_alone:
             asyncio.run(serve(source, host, port, opens, lambda: stop.asked or is_alone()))
     finally:
         source.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import threading
 import time
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import msgspec
 
+from cogmap.bus.access.subjects import ACTS_OR_READS
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Arrival, Member
 from cogmap.bus.zenoh_bus import ZenohBus
@@ -20,12 +22,12 @@ from cogmap.cli.dashboard.scene import FOLLOWED, Scene
 from cogmap.cli.dashboard.source import Playing, Wish
 from cogmap.cli.dashboard.workers import Workers
 from cogmap.cli.param import ANSWER_S, settings_of
-from cogmap.errors import NoAnswerError, NoRouterError, UsageError
+from cogmap.errors import AccessError, NoAnswerError, NoRouterError, UsageError
 from cogmap.graph.graph import Graph
 from cogmap.graph.individuals import called
 from cogmap.graph.replica import Fetched, Replica, snapshot_over
 from cogmap.hints import did_you_mean
-from cogmap.runtime import config
+from cogmap.runtime import config, environment
 from cogmap.runtime.config import Sections
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
@@ -40,9 +42,11 @@ from cogmap.schemas.topics import Topic
 from cogmap.services.codelets.public import PlanningConfig
 from cogmap.services.global_workspace.config import Config
 
+log = logging.getLogger("cogmap")
 DASHBOARD = "dashboard"
 IDLE_S = 0.1
 RETRY_S = 1.0
+ACCESS_RETRY_S = 10.0
 PUBLISHED = (topics.OFFER, topics.STREET_CLOSURE, topics.PAUSE, topics.RESET)
 
 
@@ -119,9 +123,14 @@ class Live:
             if self._has_ended.is_set():
                 break
             try:
-                bus = ZenohBus(self._endpoint, self._agent, self._has_ended.is_set)
+                keys = environment.keys(*ACTS_OR_READS)
+                bus = ZenohBus(self._endpoint, self._agent, self._has_ended.is_set, keys)
             except (NoRouterError, KeyboardInterrupt):
                 self._has_ended.wait(RETRY_S)
+                continue
+            except AccessError as error:
+                log.error("%s", error)
+                self._has_ended.wait(ACCESS_RETRY_S)
                 continue
             self._follow(bus)
 
@@ -160,7 +169,8 @@ class Connection:
         self._name = f"{DASHBOARD}-{os.getpid()}"
         bus.identify(Member(DASHBOARD, self._name))
         for topic in PUBLISHED:
-            bus.declare(topic)
+            with suppress(AccessError):  # an observer's dashboard shows, as `publish` says then
+                bus.declare(topic)
         for topic in FOLLOWED:
             bus.subscribe(topic, self._inbox.put, self._intake.count_lost)
         self.sections: Sections = {}
@@ -181,8 +191,11 @@ class Connection:
             item = self._inbox.take(0.0)
 
     def publish(self, message: Message) -> None:
-        """Publish a message of one of the topics PUBLISHED."""
+        """Publish a message of one of the topics PUBLISHED. Raises AccessError if our keys do not
+        allow that.
+        """
         topic = topics.of(message)
+        self._bus.declare(topic)
         number = self._numbers[topic]
         self._numbers[topic] += 1
         now_ns = time.time_ns()

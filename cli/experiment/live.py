@@ -18,6 +18,7 @@ from cogmap.errors import CogmapError
 from cogmap.experiments import transcript
 from cogmap.experiments.transcript import Transcript
 from cogmap.runtime.config import Sections
+from cogmap.runtime.environment import without_keys
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
@@ -71,6 +72,7 @@ def run(
     missing.
     """
     with tempfile.TemporaryDirectory() as name, ExitStack() as stack:
+        stack.enter_context(without_keys())
         folder = Path(name)
         endpoint = free_endpoint()
         (folder / CONFIG_NAME).write_text(to_toml(sections))

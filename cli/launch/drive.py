@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from cogmap.bus.access.subjects import DRIVE
 from cogmap.bus.session import free_port, listens
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.launch.display import Display
@@ -31,6 +32,7 @@ from cogmap.cli.launch.watch import Watch
 from cogmap.cli.launch.watchdog import MAX_SHARE_SLOWED, REMEDY, Situation, Watchdog
 from cogmap.cli.options import DASHBOARD_PORT
 from cogmap.errors import ProcessFailedError
+from cogmap.runtime import environment
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
 from cogmap.schemas.sensing import SpeedLimit
@@ -96,7 +98,9 @@ class Drive:
             for program in programs(self.folder, self.endpoint, self.agent, self.choices):
                 self.supervisor.start(program)
             self._note("processes started")
-            watch = Watch(ZenohBus(self.endpoint, self.agent, lambda: stop.asked))
+            keys = environment.keys(DRIVE)
+            bus = ZenohBus(self.endpoint, self.agent, lambda: stop.asked, keys)
+            watch = Watch(bus)
             ending = self._drive(watch, stop, display)
         finally:
             self._close(watch)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import click
 
+from cogmap.bus.access.subjects import RECORDER
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.log.choosing import (
     COMPRESSIONS,
@@ -22,7 +23,7 @@ from cogmap.cli.options import FiniteRange, json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.topic.argument import topics_argument
 from cogmap.recording import recorder, selection
-from cogmap.runtime import config
+from cogmap.runtime import config, environment
 from cogmap.runtime.process import Stop, give_way
 from cogmap.runtime.program import (
     agent_option,
@@ -135,7 +136,7 @@ def record(
     about = {"agent": agent, "config": json.dumps(config.load(config_path, settings))}
     path = output or Path(f"cogmap_{time.strftime('%Y_%m_%d-%H_%M_%S')}.mcap")
 
-    bus = ZenohBus(connect, agent)
+    bus = ZenohBus(connect, agent, keys=environment.keys(RECORDER))
     keys = RecordKeys(Stop(tied), start_paused)  # only now: until a router answers, Ctrl-C ends it
     try:
         with keys.listening(), keys.signalled():

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import click
 
+from cogmap.bus.access.subjects import REPLAY
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.log import report
 from cogmap.cli.log.choosing import (
@@ -24,7 +25,7 @@ from cogmap.recording import selection
 from cogmap.recording.replaying.player import Choices, Player
 from cogmap.recording.replaying.replay import replay_into
 from cogmap.recording.storage.reader import LogReader
-from cogmap.runtime import config
+from cogmap.runtime import config, environment
 from cogmap.runtime.process import Stop
 from cogmap.runtime.program import agent_option, config_option, connect_option, set_option
 from cogmap.services import registry
@@ -134,7 +135,7 @@ def replay(
         clock_hz=clock_hz or 0.0,
     )
     reader = LogReader(log)
-    bus = ZenohBus(connect, agent)
+    bus = ZenohBus(connect, agent, keys=environment.keys(REPLAY))
     try:
         keys = ReplayKeys(Stop(), start_paused)
         with keys.listening(), bar(f"playing {log}") as progress:

@@ -12,7 +12,8 @@ import click
 import msgspec
 from rich.console import Console
 
-from cogmap.bus.session import check_free
+from cogmap.bus.access.subjects import DRIVE
+from cogmap.bus.session import EXPOSED, check_free, is_exposed
 from cogmap.cli import BEGAN_S
 from cogmap.cli.launch.display import Display, display_on
 from cogmap.cli.launch.drive import Drive
@@ -23,6 +24,7 @@ from cogmap.cli.run.checks import check_inputs
 from cogmap.cli.run.folder import new_folder
 from cogmap.cli.run.options import AROUND_S, LAP_LIMIT_S
 from cogmap.errors import StorageError
+from cogmap.runtime import environment
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
 from cogmap.services import registry
@@ -115,6 +117,8 @@ def _introduce(screen: Display, drive: Drive) -> None:
     town = called(sim["town"], sim["seed"])
     screen.show(f"{drive.choices.recording or town}, files in {drive.folder}")
     screen.show(described(rules_of(drive.sections)))
+    if drive.choices.own_router and environment.keys(DRIVE) is None and is_exposed(drive.endpoint):
+        screen.show(EXPOSED)
 
     if drive.goals:
         order = "in order" if drive.sections["workspace"]["in_order"] else "in an order of its own"

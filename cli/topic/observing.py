@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from queue import Empty, SimpleQueue
 
 import zenoh
 
+from cogmap.bus.access.subjects import READS
 from cogmap.bus.codec import Envelope
 from cogmap.bus.discovery import System, discover
 from cogmap.bus.interface import Arrival, Bus, Member
 from cogmap.bus.session import CONNECT_TIMEOUT_S, open_client
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.errors import NoRouterError
+from cogmap.runtime import environment
 from cogmap.schemas.topics import Topic
 
 TICK_S = 0.1
@@ -86,11 +88,13 @@ class RouterWatch:
 
 
 @contextmanager
-def observing(connect: str, agent: str, who: str | Member) -> Iterator[ZenohBus]:
-    """Open a bus on which others see this process as `who`, a verb as `cli-verb`. Raises
-    NoRouterError.
+def observing(
+    connect: str, agent: str, who: str | Member, subjects: Sequence[str] = READS
+) -> Iterator[ZenohBus]:
+    """Open a bus on which others see this process as `who`, a verb as `cli-verb`, with the keys of
+    the first of `subjects`. Raises NoRouterError, AccessError.
     """
-    bus = ZenohBus(connect, agent)
+    bus = ZenohBus(connect, agent, keys=environment.keys(*subjects))
     try:
         bus.identify(who if isinstance(who, Member) else Member(CLI, f"{CLI}-{who}"))
         yield bus
@@ -98,9 +102,11 @@ def observing(connect: str, agent: str, who: str | Member) -> Iterator[ZenohBus]
         bus.close()
 
 
-def inspect_system(connect: str, agent: str) -> System:
-    """Find the processes of `agent`, and the topics that they use. Raises NoRouterError."""
-    session = open_client(connect)
+def inspect_system(connect: str, agent: str, subjects: Sequence[str] = READS) -> System:
+    """Find the processes of `agent`, and the topics that they use, with the keys of the first of
+    `subjects`. Raises NoRouterError, AccessError.
+    """
+    session = open_client(connect, keys=environment.keys(*subjects))
     try:
         return discover(session, agent)
     finally:

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 
 import click
 
+from cogmap.bus.access.subjects import ACTS
 from cogmap.bus.discovery import Role, discover
 from cogmap.bus.interface import Member
 from cogmap.bus.zenoh_bus import ZenohBus
@@ -128,7 +129,8 @@ def pub(
         awaited = 0 if limit is None else 1
 
     member = Member(module or CLI, f"{CLI}-{VERB}")
-    with observing(connect, agent, member) as bus:
+    subjects = ACTS if module is None else (module,)
+    with observing(connect, agent, member, subjects) as bus:
         system = discover(bus.session, agent)
         check_unpublished(system, topic)
         stop = Stop()

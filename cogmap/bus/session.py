@@ -4,6 +4,7 @@ they connect to.
 
 from __future__ import annotations
 
+import ipaddress
 import json
 import re
 import socket
@@ -14,14 +15,21 @@ from typing import TYPE_CHECKING
 
 import zenoh
 
-from cogmap.errors import NoRouterError, PortInUseError, UsageError
+from cogmap.bus.access import handshake
+from cogmap.bus.access.rules import access_control
+from cogmap.errors import AccessError, NoRouterError, PortInUseError, UsageError
 
 if TYPE_CHECKING:
+    from cogmap.bus.access.keys import Keys
     from cogmap.bus.interface import Member
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_AGENT = "agent"
 START_ROUTER = "start one with `cogmap run` or `cogmap router`, or name its endpoint with --connect"
+EXPOSED = (
+    "whoever reaches the router from another machine may read and command everything: "
+    "make keys with `cogmap keys make DIR`, and name them with --keys"
+)
 # How long a client waits for a router, for one answer of it, and between two attempts; TCP's
 # greatest port.
 CONNECT_TIMEOUT_S = 5.0
@@ -35,6 +43,7 @@ WAIT_BEFORE_DROP_US = 100_000
 # A stereo frame takes seven batches: with room for two only, a busy machine would drop it before it
 # is sent.
 QUEUE_BATCHES = 16
+PROTOCOLS = (TCP, TLS) = ("tcp", "tls")
 _QUEUES = ("data_high", "data", "data_low")
 _NAME = re.compile(r"[\w.-]+")
 
@@ -81,15 +90,17 @@ def open_client(
     timeout_s: float = CONNECT_TIMEOUT_S,
     is_asked_to_end: Callable[[], bool] | None = None,
     remedy: str = START_ROUTER,
+    keys: Keys | None = None,
 ) -> zenoh.Session:
-    """Return a session with the router at `endpoint`. Raises NoRouterError if none answers in
-    time.
+    """Return a session with the router at `endpoint`, by TLS where there are `keys`. Raises
+    NoRouterError if none answers in time, and AccessError if it is not one for these keys.
 
     Until something listens there, Ctrl-C ends the wait at once. A process that handles signals
     itself gives `is_asked_to_end`: once that is true, the wait ends with KeyboardInterrupt.
     """
+    _check_protocol(endpoint, keys)
     left_s = _await_listener(endpoint, timeout_s, is_asked_to_end or (lambda: False))
-    settings = {
+    settings: dict[str, object] = {
         "connect/endpoints": [endpoint],
         "connect/timeout_ms": int(left_s * 1000),
         "connect/exit_on_failure": True,
@@ -99,10 +110,23 @@ def open_client(
             "period_increase_factor": 1.5,
         },
     }
+    missing = NoRouterError(f"no router at {endpoint} within {timeout_s:g} s: {remedy}")
+    if keys is not None:
+        try:
+            handshake.check(_address(endpoint), keys)
+        except OSError:
+            raise missing from None
+        settings["connect/endpoints"] = [_secured(endpoint)]
+        settings["transport/link/tls"] = keys.to_connect()
+
     try:
         return zenoh.open(_config("client", **settings))
     except zenoh.ZError:
-        raise NoRouterError(f"no router at {endpoint} within {timeout_s:g} s: {remedy}") from None
+        if keys is None and handshake.speaks_tls(_address(endpoint)):
+            raise AccessError(
+                f"the router at {endpoint} asks for keys: name their folder with --keys"
+            ) from None
+        raise missing from None
 
 
 def _await_listener(endpoint: str, timeout_s: float, is_asked_to_end: Callable[[], bool]) -> float:
@@ -123,14 +147,21 @@ def _await_listener(endpoint: str, timeout_s: float, is_asked_to_end: Callable[[
     return max(RETRY_S, left_s)
 
 
-def open_router(endpoint: str) -> zenoh.Session:
-    """Return a router that listens at `endpoint`. Raises PortInUseError if something else does."""
+def open_router(endpoint: str, keys: Keys | None = None) -> zenoh.Session:
+    """Return a router that listens at `endpoint`; with `keys`, for those alone whom the rules
+    allow. Raises PortInUseError if something else does listen.
+    """
+    _check_protocol(endpoint, keys)
     check_free(endpoint)
     settings: dict[str, object] = {
         "listen/endpoints": [endpoint],
         # Whoever asked it while a session declares would stop the router: see `discovery`.
         "adminspace/enabled": False,
     }
+    if keys is not None:
+        settings["listen/endpoints"] = [_secured(endpoint)]
+        settings["transport/link/tls"] = keys.to_listen()
+        settings["access_control"] = access_control()
     return zenoh.open(_config("router", **settings))
 
 
@@ -166,13 +197,36 @@ def _config(mode: str, **settings: object) -> zenoh.Config:
     return config
 
 
+def is_exposed(endpoint: str) -> bool:
+    """Return whether other machines reach what listens at `endpoint`."""
+    host, _ = _address(endpoint)
+    try:
+        return not ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host != "localhost"
+
+
+def _secured(endpoint: str) -> str:
+    """Return `endpoint` as one of TLS: whoever has keys speaks nothing else."""
+    _, _, address = endpoint.partition("/")
+    return f"{TLS}/{address}"
+
+
+def _check_protocol(endpoint: str, keys: Keys | None) -> None:
+    """Raise AccessError if `endpoint` is one of TLS and there are no keys for it."""
+    protocol, _, _ = endpoint.partition("/")
+    if protocol == TLS and keys is None:
+        raise AccessError(f"{endpoint} is for keys: name their folder with --keys or COGMAP_KEYS")
+
+
 def _address(endpoint: str) -> tuple[str, int]:
-    """Return host and port. Raises UsageError if `endpoint` is not one of TCP."""
+    """Return host and port. Raises UsageError if `endpoint` is of neither TCP nor TLS."""
     protocol, _, address = endpoint.partition("/")
     host, _, port = address.rpartition(":")
     is_port = port.isdecimal() and int(port) <= MAX_PORT
-    if protocol != "tcp" or not host or not is_port:
+    if protocol not in PROTOCOLS or not host or not is_port:
         raise UsageError(
-            f"endpoint {endpoint!r}: write it as tcp/HOST:PORT, with a port of at most {MAX_PORT}"
+            f"endpoint {endpoint!r}: write it as tcp/HOST:PORT, or tls/HOST:PORT with --keys, "
+            f"with a port of at most {MAX_PORT}"
         )
     return host.strip("[]"), int(port)

@@ -6,17 +6,21 @@ import sys
 import time
 from collections.abc import Callable
 from datetime import timedelta
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import zenoh
 from zenoh import ext
 
+from cogmap.bus.access.subjects import SUBJECTS
 from cogmap.bus.codec import Envelope, decode_envelope, encode
 from cogmap.bus.discovery import Role, announce_use, identify
 from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
 from cogmap.bus.session import check_name, open_client, ready_key
 from cogmap.errors import MessageError, NoAnswerError
 from cogmap.schemas.topics import Delivery, Scope, Topic
+
+if TYPE_CHECKING:
+    from cogmap.bus.access.keys import Keys
 
 # Zenoh delivers on a thread of its own, which at Python's default would wait 5 ms for a module that
 # computes.
@@ -39,19 +43,25 @@ class _Closable(Protocol):
 
 class ZenohBus:
     """Connects to the router at `endpoint` as `agent`. `is_asked_to_end` can end the wait for the
-    router, see `open_client`.
+    router, see `open_client`. With `keys` it is their subject, and may do what that may: the router
+    would deny the rest in silence.
 
-    Raises NoRouterError if none answers in time, and UsageError for a name that cannot be part
-    of a key.
+    Raises NoRouterError if none answers in time, AccessError if its keys are wrong or do not allow
+    what is asked for, and UsageError for a name that cannot be part of a key.
     """
 
     def __init__(
-        self, endpoint: str, agent: str, is_asked_to_end: Callable[[], bool] | None = None
+        self,
+        endpoint: str,
+        agent: str,
+        is_asked_to_end: Callable[[], bool] | None = None,
+        keys: Keys | None = None,
     ) -> None:
         check_name("--agent", agent)
         sys.setswitchinterval(SWITCH_S)
         self._agent = agent
-        self._session = open_client(endpoint, is_asked_to_end=is_asked_to_end)
+        self._subject = None if keys is None else SUBJECTS.get(keys.name)
+        self._session = open_client(endpoint, is_asked_to_end=is_asked_to_end, keys=keys)
         self._publishers: dict[Topic, Any] = {}
         self._declared: list[_Closable] = []
         self._is_named = False
@@ -64,6 +74,8 @@ class ZenohBus:
     def declare(self, topic: Topic) -> None:
         if topic in self._publishers:
             return
+        if self._subject is not None:
+            self._subject.check_publishes(topic)
         key = topic.key(self._agent)
         if topic.delivery is Delivery.NEVER_DROP:
             self._publishers[topic] = self._caching_publisher(key, topic)
@@ -113,6 +125,8 @@ class ZenohBus:
             now_ns = time.time_ns()
             deliver(Arrival(topic, bytes(sample.payload), _envelope(sample), now_ns))
 
+        if self._subject is not None:
+            self._subject.check_subscribes(topic)
         self._announce_use(Role.SUBSCRIBES, topic)
         key = topic.key(self._agent)
         if topic.delivery is not Delivery.NEVER_DROP:
@@ -150,6 +164,8 @@ class ZenohBus:
                     attachment=None if answer.envelope is None else encode(answer.envelope),
                 )
 
+        if self._subject is not None:
+            self._subject.check_answers(request)
         self._announce_use(Role.ANSWERS, request)
         key = request.key(self._agent)
         self._declared.append(
@@ -157,6 +173,8 @@ class ZenohBus:
         )
 
     def query(self, request: Topic, payload: bytes, timeout_s: float) -> Answer:
+        if self._subject is not None:
+            self._subject.check_asks(request)
         replies = self._session.get(
             request.key(self._agent),
             payload=payload,
@@ -187,6 +205,8 @@ class ZenohBus:
         if self._is_named:
             return
         check_name("--instance", member.instance)
+        if self._subject is not None:
+            self._subject.check_is(member.module, member.instance)
         self._is_named = True
         self._declared.append(identify(self._session, self._agent, member))
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from contextlib import ExitStack
 from typing import NamedTuple
 
+from cogmap.bus.access.subjects import ROS2
 from cogmap.bus.session import open_client
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.ros2.bridge import Bridge, Options, Saying
 from cogmap.ros2.rmw.node import RosNode
 from cogmap.ros2.rmw.types import Types
 from cogmap.ros2.showing import Showing
+from cogmap.runtime import environment
 from cogmap.runtime.client import Client
 from cogmap.runtime.process import IDLE_S, Stop
 from cogmap.runtime.shell import Shell
@@ -50,12 +52,12 @@ def run_bridge(place: Place, options: Options, stop: Stop) -> None:
         closing.callback(node.close)
 
         bridge = Bridge(node, options)
-        bus = ZenohBus(place.connect, place.agent, lambda: stop.asked)
+        bus = ZenohBus(place.connect, place.agent, lambda: stop.asked, environment.keys(ROS2))
         shell = Shell(bridge.module(), bus)
         closing.callback(shell.close)
         saying = Saying(node, options, place.with_transforms)
         showing = Showing(types.messages, saying.say, lambda: bridge.senses)
-        closing.enter_context(Client(showing.module(), place.connect, place.agent))
+        closing.enter_context(Client(showing.module(), place.connect, place.agent, (ROS2,)))
 
         shell.open()
         bridge.open(shell.call)

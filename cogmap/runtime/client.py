@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from types import TracebackType
 
+from cogmap.bus.access.subjects import ACTS
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.runtime import environment
 from cogmap.runtime.module import Module
@@ -19,7 +21,9 @@ class Client:
 
     It is connected to the router at `endpoint`, as one of `agent`'s; by default to the router at
     $COGMAP_CONNECT, as one of $COGMAP_AGENT's, as the modules are. Raises NoRouterError if none
-    answers. Handlers are called on that thread; what ends it early is raised at the end.
+    answers. With $COGMAP_KEYS it has the keys of the first of `subjects`, by default those of the
+    operator, which a module called `notebook` may use; raises AccessError without them. Handlers
+    are called on that thread; what ends it early is raised at the end.
 
         graph = Graph()
         with Client(Module("notebook").following(graph)):
@@ -28,9 +32,14 @@ class Client:
     """
 
     def __init__(
-        self, module: Module, endpoint: str | None = None, agent: str | None = None
+        self,
+        module: Module,
+        endpoint: str | None = None,
+        agent: str | None = None,
+        subjects: Sequence[str] = ACTS,
     ) -> None:
         self.module = module
+        self._subjects = subjects
         self._endpoint = endpoint or environment.endpoint()
         self._agent = agent or environment.agent()
         self._ended = threading.Event()
@@ -38,7 +47,8 @@ class Client:
         self._error: Exception | None = None
 
     def __enter__(self) -> Client:
-        shell = Shell(self.module, ZenohBus(self._endpoint, self._agent))
+        keys = environment.keys(*self._subjects)
+        shell = Shell(self.module, ZenohBus(self._endpoint, self._agent, keys=keys))
         shell.open()
         self._ended.clear()
         self._thread = threading.Thread(target=self._work, args=(shell,), daemon=True)

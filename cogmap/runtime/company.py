@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from cogmap.bus.access.keys import Keys
 from cogmap.bus.interface import Bus, Member
 from cogmap.bus.zenoh_bus import ZenohBus
 
@@ -55,15 +56,17 @@ def watch_company(bus: Bus, module: str) -> Callable[[], bool]:
 
 
 @contextmanager
-def company_at(endpoint: str, agent: str, module: str) -> Iterator[Callable[[], bool]]:
+def company_at(
+    endpoint: str, agent: str, module: str, keys: Keys | None = None
+) -> Iterator[Callable[[], bool]]:
     """Watch `module` on a bus of its own, in a process that has none: see `watch_company`. Raises
-    NoRouterError.
+    NoRouterError, AccessError.
     """
     if not module:
         yield lambda: False
         return
 
-    bus = ZenohBus(endpoint, agent)
+    bus = ZenohBus(endpoint, agent, keys=keys)
     try:
         yield watch_company(bus, module)
     finally:

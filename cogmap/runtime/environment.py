@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 
+from cogmap.bus.access.keys import Keys, found
 from cogmap.bus.session import DEFAULT_AGENT, DEFAULT_ENDPOINT, check_name
 
 CONNECT = "COGMAP_CONNECT"
 AGENT = "COGMAP_AGENT"
+KEYS = "COGMAP_KEYS"
 CONFIG = "COGMAP_CONFIG"
 ENDS_WITH = "COGMAP_ENDS_WITH"
 
@@ -24,3 +29,24 @@ def agent() -> str:
     name = os.environ.get(AGENT) or DEFAULT_AGENT
     check_name(f"${AGENT}", name)
     return name
+
+
+def keys(*names: str) -> Keys | None:
+    """Return the keys of the first of `names` that the folder of $COGMAP_KEYS has; None if that is
+    not set. Raises AccessError if it has none of them.
+    """
+    folder = os.environ.get(KEYS)
+    return found(Path(folder), names) if folder else None
+
+
+@contextmanager
+def without_keys() -> Iterator[None]:
+    """Let this process, and those that it starts, use no keys: on a bus of their own, on which
+    nobody has a part who has a certificate.
+    """
+    folder = os.environ.pop(KEYS, None)
+    try:
+        yield
+    finally:
+        if folder is not None:
+            os.environ[KEYS] = folder

@@ -10,7 +10,8 @@ import threading
 from pathlib import Path
 from types import FrameType
 
-from cogmap.bus.session import check_name, open_router
+from cogmap.bus.access.subjects import ROUTER
+from cogmap.bus.session import EXPOSED, check_name, is_exposed, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.runtime import environment
 from cogmap.runtime.company import company_at, watch_company
@@ -117,7 +118,11 @@ def run_module(
             journal = Journal(state / f"{module.instance}.journal")
 
     store = Store(memory) if memory is not None and module.remembers else None
-    bus = ZenohBus(endpoint or environment.endpoint(), agent or environment.agent())
+    bus = ZenohBus(
+        endpoint or environment.endpoint(),
+        agent or environment.agent(),
+        keys=environment.keys(module.name),
+    )
     stop = Stop(tied)  # only now: until a router answers, a signal ends the process at once
     shell = Shell(module, bus, journal, counts=counts, store=store)
     try:
@@ -132,11 +137,14 @@ def run_module(
 
 def run_router(endpoint: str, stop: Stop, agent: str = "", ends_with: str = "") -> None:
     """Run a router until `stop` is asked, or until `agent`'s module `ends_with` has left the bus,
-    or did not come. Raises PortInUseError.
+    or did not come. Raises PortInUseError, and AccessError if it has no keys where it should.
     """
-    session = open_router(endpoint)
+    keys = environment.keys(ROUTER)
+    session = open_router(endpoint, keys)
     log.info("router listens at %s", endpoint)
-    with company_at(endpoint, agent, ends_with) as is_alone:
+    if keys is None and is_exposed(endpoint):
+        log.warning("%s", EXPOSED)
+    with company_at(endpoint, agent, ends_with, keys) as is_alone:
         # Without a time limit, a signal that comes before it is not seen.
         while not stop.wait(IDLE_S) and not is_alone():
             pass

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypedDict, TypeVar, Unpack
@@ -22,13 +23,35 @@ from cogmap.schemas.process import Settings
 C = TypeVar("C", bound=msgspec.Struct)
 F = TypeVar("F", bound=Callable[..., Any])
 
-connect_option = click.option(
+_endpoint_option = click.option(
     "--connect",
     default=DEFAULT_ENDPOINT,
     show_default=True,
     envvar=environment.CONNECT,
     help="Where the router listens.",
 )
+
+
+def _use_keys(context: click.Context, option: click.Parameter, folder: Path | None) -> None:
+    """Let this process, and those that it starts, use the keys in `folder`."""
+    if folder is not None:
+        os.environ[environment.KEYS] = str(folder.resolve())
+
+
+_keys_option = click.option(
+    "--keys",
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+    callback=_use_keys,
+    expose_value=False,
+    envvar=environment.KEYS,
+    metavar="DIR",
+    help="The folder of keys that `cogmap keys make` made; all connections are TLS then.",
+)
+
+
+def connect_option(command: F) -> F:
+    """Give a command the options of where its router is and whose keys open it."""
+    return _endpoint_option(_keys_option(command))
 
 
 def _checked(context: click.Context, option: click.Parameter, name: str) -> str:
