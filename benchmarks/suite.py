@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks import constants, paper
+from benchmarks.access import measure as access
 from benchmarks.benchmark import PROCESSES, Benchmark, Setting
 from benchmarks.bus import measure as bus
 from benchmarks.cognition import measure as cognition
@@ -46,6 +47,7 @@ from cogmap.parallel import end_workers, exit_with
 
 SUITE = (
     Benchmark("cycle", cycle.THRESHOLDS, cycle.measure, options=[PROCESSES]),
+    Benchmark("access", access.THRESHOLDS, access.measure, options=access.OPTIONS),
     Benchmark("bus", bus.THRESHOLDS, bus.measure, options=bus.OPTIONS),
     Benchmark(
         "perception",

@@ -15,12 +15,13 @@ from cogmap.cli.name import Namer
 from cogmap.cli.teleop import Steering
 from cogmap.errors import AccessError
 from cogmap.ros2 import bridge
+from cogmap.runtime.config import Sections
 from cogmap.runtime.module import Module
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Topic
 from cogmap.services import registry
 
-RUNS = (
+RUNS: tuple[Sections, ...] = (
     {"run": {"lockstep": True, "energy": True}, "sim": {"egl": False}},
     {"run": {"lockstep": False, "energy": False}, "sim": {"egl": False}},
     {"run": {"lockstep": True}, "sim": {"sensing": "percepts"}},
