@@ -10,6 +10,11 @@ RUN apt-get update \
 RUN useradd --system --uid 10001 --home-dir /var/lib/cogmap cogmap \
     && install -d -o cogmap -g cogmap /var/lib/cogmap /var/lib/cogmap/runs
 
+# The folders of keys, each of which a volume begins as: whoever runs the containers may write there.
+RUN for name in authority sim player sensory epam workspace codelets global_workspace memory \
+        procedural action motor operator observer recorder drive replay ros2 router; \
+    do install -d -m 1777 /var/lib/cogmap/keys/$name; done
+
 
 FROM system AS build
 

@@ -45,8 +45,9 @@ $(RERUN): $(INSTALLED) requirements/rerun.txt
 # A battery that lasts for a minute or two of driving, so that a need rises while one watches.
 LIVES = --energy --explore $$((60 * $(MINUTES))) --set 'sim.battery={capacity_s=400}'
 
-demo: setup ## explore a simulated town and drive home; DASHBOARD=1 opens a browser that shows it, TOUR=1 for goals and a closed street, MINUTES=5 for a life with a battery; ARGS="--seed 2" for more
-	$(BIN)/cogmap run $(if $(DASHBOARD),--open-dashboard,--dashboard) $(if $(TOUR),--tour,--town blocks $(if $(MINUTES),$(LIVES),--explore 45)) $(ARGS)
+demo: setup ## explore a simulated town and drive home; DASHBOARD=1 opens a browser that shows it, TOUR=1 for goals and a closed street, MINUTES=5 for a life with a battery, KEYS=1 for TLS with a certificate a process; ARGS="--seed 2" for more
+	$(if $(KEYS),$(BIN)/cogmap keys make build/keys)
+	$(BIN)/cogmap run$(if $(KEYS), --keys build/keys) $(if $(DASHBOARD),--open-dashboard,--dashboard) $(if $(TOUR),--tour,--town blocks $(if $(MINUTES),$(LIVES),--explore 45)) $(ARGS)
 
 test: setup ## every test but those of the containers; those of training are skipped without torch
 	$(BIN)/python -m pytest -n auto --dist loadfile --ignore tests/e2e --ignore tests/fault --cov --cov-report=

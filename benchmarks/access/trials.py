@@ -22,6 +22,7 @@ SETTLE_S = 0.3
 ANSWER_S = 1.0
 POLL_S = 0.02
 FORGER = "forger"
+_KINDS = ("@ready", "@incarnation", "@session", "@use")
 NOBODY = Subject("nobody")
 _KEPT = [topic for topic in topics.ALL if topic.delivery is Delivery.NEVER_DROP]
 
@@ -110,7 +111,10 @@ def _subscribe(
 
 def _asking(subject: Subject) -> Deeds:
     allowed = {f"ask {topic.name}": topic in subject.asks for topic in topics.ALL}
-    return allowed | {f"fetch {topic.name}": topic in subject.subscribes for topic in _KEPT}
+    for topic in _KEPT:
+        allowed[f"fetch {topic.name}"] = topic in subject.subscribes
+        allowed[f"fetch the past of {topic.name}"] = topic in subject.subscribes
+    return allowed
 
 
 def _ask(
@@ -120,8 +124,10 @@ def _ask(
     allowed = _asking(subject)
     asked = {f"ask {topic.name}": _key(topic) for topic in topics.ALL}
     asked |= {f"fetch {topic.name}": f"{_key(topic)}/@adv/**" for topic in _KEPT}
+    asked |= {f"fetch the past of {topic.name}": _past_key(topic, "w") for topic in _KEPT}
     answering = {_key(topic): _key(topic) for topic in topics.ALL}
     answering |= {_cache_key(topic, "w"): _key(topic) for topic in _KEPT}
+    answering |= {_past_key(topic, "w"): _past_key(topic, "w") for topic in _KEPT}
 
     queryables = [_queryable(witness, key, reply, "w") for key, reply in answering.items()]
     _meet(witness)
@@ -132,7 +138,10 @@ def _ask(
 
 def _answering(subject: Subject) -> Deeds:
     allowed = {f"answer {topic.name}": topic in subject.answers for topic in topics.ALL}
-    return allowed | {f"keep {topic.name}": topic in subject.publishes for topic in _KEPT}
+    for topic in _KEPT:
+        allowed[f"keep {topic.name}"] = topic in subject.publishes
+        allowed[f"keep the past of {topic.name}"] = topic in subject.publishes
+    return allowed
 
 
 def _answer(
@@ -142,8 +151,10 @@ def _answer(
     allowed = _answering(subject)
     answering = {_key(topic): _key(topic) for topic in topics.ALL}
     answering |= {_cache_key(topic, FORGER): _key(topic) for topic in _KEPT}
+    answering |= {_past_key(topic, FORGER): _past_key(topic, FORGER) for topic in _KEPT}
     asked = {f"answer {topic.name}": _key(topic) for topic in topics.ALL}
     asked |= {f"keep {topic.name}": f"{_key(topic)}/@adv/**" for topic in _KEPT}
+    asked |= {f"keep the past of {topic.name}": _past_key(topic, FORGER) for topic in _KEPT}
 
     queryables = [_queryable(party, key, reply, who) for key, reply in answering.items()]
     _meet(party)
@@ -164,6 +175,10 @@ def _tokens(subject: Subject) -> dict[str, tuple[str, bool]]:
         found[f"be {member}"] = (f"cogmap/{AGENT}/@ready/{member}/{FORGER}", is_allowed)
         found[f"be called {member}"] = (
             f"cogmap/{AGENT}/@session/{FORGER}/{member}/{FORGER}",
+            is_allowed,
+        )
+        found[f"be an incarnation of {member}"] = (
+            f"cogmap/{AGENT}/@incarnation/{member}/{FORGER}/1",
             is_allowed,
         )
     for topic in topics.ALL:
@@ -211,7 +226,7 @@ def _announce(
         if sample.kind == zenoh.SampleKind.PUT and key in deed_of:
             achieved.add(deed_of[key])
 
-    watched = [f"cogmap/{AGENT}/{kind}/**" for kind in ("@ready", "@session", "@use")]
+    watched = [f"cogmap/{AGENT}/{kind}/**" for kind in _KINDS]
     watched += [f"{_key(topic)}/@adv/pub/**" for topic in _KEPT]
     watching = [witness.liveliness().declare_subscriber(key, see, history=True) for key in watched]
     tokens = [party.liveliness().declare_token(key) for key in deed_of]
@@ -225,6 +240,7 @@ def _seeing(subject: Subject) -> Deeds:
     is_known = subject is not NOBODY
     return {
         "see who is ready": is_known,
+        "see incarnations": is_known,
         "see sessions": subject.discovers,
         "see uses": subject.discovers,
     }
@@ -235,9 +251,10 @@ def _see(
 ) -> tuple[Deeds, set[str]]:
     """Look for the tokens of the witness."""
     allowed = _seeing(subject)
-    kinds = dict(zip(allowed, ("@ready", "@session", "@use"), strict=True))
+    kinds = dict(zip(allowed, _KINDS, strict=True))
     places = {
         "@ready": "sim/seen",
+        "@incarnation": "sim/seen/1",
         "@session": "z/sim/seen",
         "@use": "z/publisher/odometry",
     }
@@ -316,6 +333,10 @@ def _key(topic: Topic) -> str:
 
 def _cache_key(topic: Topic, publisher: str) -> str:
     return f"{_key(topic)}/@adv/pub/{publisher}/1/_"
+
+
+def _past_key(topic: Topic, source: str) -> str:
+    return f"{_key(topic)}/@past/{source}"
 
 
 def _name_of(key: object) -> str:

@@ -14,11 +14,13 @@ from pathlib import Path
 import pytest
 from aiohttp import ClientSession
 
+from cogmap.bus.access.keys import Keys
 from cogmap.bus.interface import Member
 from cogmap.bus.session import free_endpoint, free_port
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.launch.drive_metrics import Recording
 from cogmap.cli.launch.watch import Watch
+from cogmap.errors import AccessError
 from cogmap.services import registry
 
 pytestmark = pytest.mark.compose
@@ -90,6 +92,11 @@ class Compose:
         """The ids of the containers of a service."""
         ids = self("ps", "--quiet", service)
         return ids.split()
+
+    def keys(self, folder: Path, name: str) -> Keys:
+        """The keys of a subject of this project, copied into `folder`."""
+        self("cp", f"keys:/var/lib/cogmap/keys/{name}", str(folder))
+        return Keys(folder / name, name)
 
     def cogmap(self, service: str, command: str) -> str:
         """What `cogmap` prints in a container of `service`, whatever its exit code."""
@@ -169,9 +176,10 @@ def compose(image: None) -> Iterator[Compose]:
 
 
 @pytest.fixture(scope="module")
-def watch(compose: Compose) -> Iterator[Watch]:
-    """An observer from outside the containers, through the published port."""
-    watch = Watch(ZenohBus(compose.endpoint, "agent"))
+def watch(compose: Compose, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Watch]:
+    """An observer from outside the containers, through the published port, with a drive's keys."""
+    folder = tmp_path_factory.mktemp("keys")
+    watch = Watch(ZenohBus(compose.endpoint, "agent", keys=compose.keys(folder, "drive")))
     yield watch
     watch.close()
 
@@ -194,6 +202,17 @@ def test_all_that_was_waited_for_is_healthy(compose: Compose) -> None:
 def test_frames_lead_to_commands_that_move_the_robot(watch: Watch) -> None:
     wait_until(watch, lambda: watch.tally.observer.travelled_m > 3.0)
     wait_until(watch, lambda: len(watch.tally.cycle_ms) > 5)
+
+
+def test_nobody_gets_in_without_keys(watch: Watch, compose: Compose) -> None:
+    with pytest.raises(AccessError, match="asks for keys"):
+        ZenohBus(compose.endpoint, "agent")
+
+
+def test_a_container_has_its_own_keys_alone(compose: Compose) -> None:
+    listed = compose("exec", "-T", "motor", "sh", "-c", "ls /var/lib/cogmap/keys/*/key.pem")
+
+    assert listed.split() == ["/var/lib/cogmap/keys/motor/key.pem"]
 
 
 def test_each_worker_has_a_name_of_its_own(watch: Watch, compose: Compose) -> None:

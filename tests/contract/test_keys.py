@@ -38,7 +38,7 @@ def endpoint(folder: Path) -> Iterator[str]:
     address = free_endpoint()
     router = open_router(address, keys_in(folder, "router"))
     yield address
-    router.close()
+    router.close()  # type: ignore[no-untyped-call]
 
 
 def refusal(endpoint: str, keys: Keys | None) -> str:
@@ -85,7 +85,7 @@ def test_an_expired_router_is_said(folder: Path, tmp_path: Path) -> None:
     router = open_router(address, keys_in(tmp_path, "router"))
 
     said = refusal(address, keys_in(folder, "motor"))
-    router.close()
+    router.close()  # type: ignore[no-untyped-call]
 
     assert "has expired" in said
 
@@ -95,7 +95,7 @@ def test_a_module_cannot_pass_for_the_router(folder: Path) -> None:
     router = open_router(address, keys_in(folder, "motor"))
 
     said = refusal(address, keys_in(folder, "epam"))
-    router.close()
+    router.close()  # type: ignore[no-untyped-call]
 
     assert "is not accepted" in said
 
@@ -105,7 +105,7 @@ def test_a_router_under_another_name_is_said(folder: Path) -> None:
     router = open_router(address, keys_in(folder, "router"))
 
     said = refusal(address, keys_in(folder, "motor"))
-    router.close()
+    router.close()  # type: ignore[no-untyped-call]
 
     assert "does not name 127.0.0.2" in said
     assert "--host 127.0.0.2" in said

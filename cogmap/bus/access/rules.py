@@ -16,9 +16,20 @@ from cogmap.schemas.topics import Topic
 EVERY_AGENT = "*"
 INGRESS = "ingress"
 EGRESS = "egress"
-PRESENT = f"cogmap/{EVERY_AGENT}/@ready/**"
-SESSIONS = f"cogmap/{EVERY_AGENT}/@session/**"
-USES = f"cogmap/{EVERY_AGENT}/@use/**"
+READY = f"cogmap/{EVERY_AGENT}/@ready"
+INCARNATIONS = f"cogmap/{EVERY_AGENT}/@incarnation"
+SESSIONS = f"cogmap/{EVERY_AGENT}/@session"
+USES = f"cogmap/{EVERY_AGENT}/@use"
+CACHE = "@adv/pub/**"
+"""Where, below a topic's key, Zenoh's cache of a publisher answers."""
+
+PAST = "@past/**"
+"""Where a publisher answers for what it has kept longer."""
+
+EARLIER = ("@adv/**", PAST)
+"""Where a subscriber asks for what it missed."""
+
+_SEEING = ["liveliness_query", "declare_liveliness_subscriber"]
 
 
 def access_control(subjects: Iterable[Subject] = tuple(SUBJECTS.values())) -> dict[str, Any]:
@@ -44,19 +55,20 @@ def access_control(subjects: Iterable[Subject] = tuple(SUBJECTS.values())) -> di
 def rules_of(subject: Subject) -> list[dict[str, Any]]:
     """Return the rules of one subject."""
     published = _keys(subject.publishes)
-    kept = _below(published, "@adv/pub/**")
+    kept = _below(published, CACHE, PAST)
     subscribed = _keys(subject.subscribes)
-    missed = _below(subscribed, "@adv/**")
+    missed = _below(subscribed, *EARLIER)
     answered = _keys(subject.answers)
     asked = _keys(subject.asks)
-    seen = [PRESENT, SESSIONS, USES] if subject.discovers else [PRESENT]
+    seen = [f"{READY}/**", f"{INCARNATIONS}/**"]
+    if subject.discovers:
+        seen += [f"{SESSIONS}/**", f"{USES}/**"]
 
     allowed = (
         ("publish", INGRESS, ["put"], published),
         ("publish-to", EGRESS, ["declare_subscriber"], [*published, *kept]),
-        # The cache of a publisher, from which a subscriber gets what it missed.
         ("keep", INGRESS, ["put", "declare_queryable", "liveliness_token"], kept),
-        ("keep-for", EGRESS, ["query"], _below(published, "@adv/**")),
+        ("keep-for", EGRESS, ["query"], _below(published, *EARLIER)),
         ("give", INGRESS, ["reply"], [*published, *kept, *answered]),
         ("subscribe", INGRESS, ["declare_subscriber"], [*subscribed, *missed]),
         ("receive", EGRESS, ["put"], [*subscribed, *missed]),
@@ -82,23 +94,17 @@ def rules_of(subject: Subject) -> list[dict[str, Any]]:
     ]
 
 
-_SEEING = ["liveliness_query", "declare_liveliness_subscriber"]
-
-
 def tokens_of(subject: Subject) -> list[str]:
-    """Return the liveliness tokens that it may hold: who it is, that it is ready, and what it
-    does.
+    """Return the liveliness tokens that it may hold: who it is, since when, that it is ready, and
+    what it does.
     """
-    session = f"cogmap/{EVERY_AGENT}/@session/*"
-    use = f"cogmap/{EVERY_AGENT}/@use/*"
     found = []
     for member in subject.members:
-        path = member if "/" in member else f"{member}/**"
-        found += [f"cogmap/{EVERY_AGENT}/@ready/{path}", f"{session}/{path}"]
+        found += [f"{root}/{member}/**" for root in (READY, INCARNATIONS, f"{SESSIONS}/*")]
 
-    found += [f"{use}/publisher/{topic.name}" for topic in _sorted(subject.publishes)]
-    found += [f"{use}/subscriber/{topic.name}" for topic in _sorted(subject.subscribes)]
-    found += [f"{use}/queryable/{topic.name}" for topic in _sorted(subject.answers)]
+    found += [f"{USES}/*/publisher/{topic.name}" for topic in _sorted(subject.publishes)]
+    found += [f"{USES}/*/subscriber/{topic.name}" for topic in _sorted(subject.subscribes)]
+    found += [f"{USES}/*/queryable/{topic.name}" for topic in _sorted(subject.answers)]
     return found
 
 
@@ -106,8 +112,8 @@ def _keys(topics: Iterable[Topic]) -> list[str]:
     return [topic.key(EVERY_AGENT) for topic in _sorted(topics)]
 
 
-def _below(keys: Iterable[str], suffix: str) -> list[str]:
-    return [f"{key}/{suffix}" for key in keys]
+def _below(keys: Iterable[str], *suffixes: str) -> list[str]:
+    return [f"{key}/{suffix}" for key in keys for suffix in suffixes]
 
 
 def _sorted(topics: Iterable[Topic]) -> list[Topic]:
