@@ -10,16 +10,18 @@ import click
 import msgspec
 import psutil
 
+from cogmap.bus.access.certificates import now_utc
 from cogmap.bus.discovery import discover
 from cogmap.bus.interface import Arrival, Member
 from cogmap.bus.zenoh_bus import ZenohBus
-from cogmap.cli.doctor import installation, system
+from cogmap.cli.doctor import installation, keys, system
 from cogmap.cli.doctor.finding import Finding
 from cogmap.cli.doctor.observed import Observed
 from cogmap.cli.options import json_option
 from cogmap.cli.run.folder import RUNS
 from cogmap.cli.topic.observing import observing
-from cogmap.errors import NoRouterError
+from cogmap.errors import AccessError, NoRouterError
+from cogmap.runtime import environment
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.program import agent_option, connect_option
@@ -40,6 +42,9 @@ def doctor(as_json: bool, connect: str, agent: str) -> None:
     Ends with 1 if there is a problem.
     """
     findings = installation.examine(RUNS)
+    folder = environment.keys_folder()
+    if folder is not None:
+        findings += keys.examine(folder, now_utc())
     try:
         with observing(connect, agent, "doctor") as bus:
             observed = observe(bus, OBSERVE_S)
@@ -50,6 +55,8 @@ def doctor(as_json: bool, connect: str, agent: str) -> None:
     except NoRouterError:
         remedy = "start one with `cogmap run`, or name it with --connect"
         findings.append(Finding("router", f"none answers at {connect}", remedy))
+    except AccessError as error:
+        findings.append(keys.refused(error))
 
     if as_json:
         click.echo(json.dumps([msgspec.to_builtins(finding) for finding in findings]))

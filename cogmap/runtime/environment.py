@@ -31,12 +31,18 @@ def agent() -> str:
     return name
 
 
+def keys_folder() -> Path | None:
+    """Return the folder of keys that $COGMAP_KEYS names; None if it names none."""
+    folder = os.environ.get(KEYS)
+    return Path(folder) if folder else None
+
+
 def keys(*names: str) -> Keys | None:
     """Return the keys of the first of `names` that the folder of $COGMAP_KEYS has; None if that is
     not set. Raises AccessError if it has none of them.
     """
-    folder = os.environ.get(KEYS)
-    return found(Path(folder), names) if folder else None
+    folder = keys_folder()
+    return None if folder is None else found(folder, names)
 
 
 @contextmanager

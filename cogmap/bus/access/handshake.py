@@ -33,15 +33,13 @@ def check(address: tuple[str, int], keys: Keys, answer_s: float = ANSWER_S) -> N
             talk.greet()
         except ssl.SSLCertVerificationError as error:
             raise AccessError(_distrusted(where, address[0], error, keys)) from None
-        except TimeoutError:
-            raise AccessError(_silent(where)) from None
-        except (ssl.SSLError, OSError):
+        except OSError:
             raise AccessError(_silent(where)) from None
         try:
             talk.await_verdict()
         except TimeoutError:
             return
-        except (ssl.SSLError, OSError) as error:
+        except OSError as error:
             raise AccessError(_refused(where, error, keys)) from None
 
 
