@@ -53,16 +53,30 @@ def keys() -> None:
     show_default=True,
     help="How long new certificates hold.",
 )
+@click.option(
+    "--modules",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="A file with rows for modules of yours: [NAME], publishes = [...], subscribes = [...].",
+)
 @click.option("--renew", is_flag=True, help="Renew all, not only what expires within 30 days.")
 @json_option
-def make(folder: Path, hosts: tuple[str, ...], days: int, renew: bool, as_json: bool) -> None:
+def make(
+    folder: Path,
+    hosts: tuple[str, ...],
+    days: int,
+    modules: Path | None,
+    renew: bool,
+    as_json: bool,
+) -> None:
     """Make the keys that DIR lacks, and renew those that expire within 30 days.
 
     Everybody gets a folder in DIR, and needs no other. The authority stays: keep DIR/authority
     apart, since whoever has its key can make keys. Also writes the rules of the router, for
     `zenohd --config DIR/router/router.json5`.
     """
-    new = site.make(folder, now_utc(), timedelta(days=days), hosts, renew)
+    lasts = timedelta(days=days)
+    new = site.make(folder, now_utc(), lasts, hosts=hosts, renews_all=renew, modules=modules)
     if as_json:
         print_json(new)
         return

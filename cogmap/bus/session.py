@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import zenoh
 
 from cogmap.bus.access import handshake
+from cogmap.bus.access.others import everybody
 from cogmap.bus.access.rules import access_control
 from cogmap.errors import AccessError, NoRouterError, PortInUseError, UsageError
 
@@ -161,7 +162,7 @@ def open_router(endpoint: str, keys: Keys | None = None) -> zenoh.Session:
     if keys is not None:
         settings["listen/endpoints"] = [_secured(endpoint)]
         settings["transport/link/tls"] = keys.to_listen()
-        settings["access_control"] = access_control()
+        settings["access_control"] = access_control(everybody(keys.folder).values())
     return zenoh.open(_config("router", **settings))
 
 

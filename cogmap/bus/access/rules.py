@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from cogmap.bus.access.subjects import SUBJECTS, Subject
+from cogmap.bus.access.subjects import Subject
 from cogmap.schemas.topics import Topic
 
 EVERY_AGENT = "*"
@@ -32,8 +32,8 @@ EARLIER = ("@adv/**", PAST)
 _SEEING = ["liveliness_query", "declare_liveliness_subscriber"]
 
 
-def access_control(subjects: Iterable[Subject] = tuple(SUBJECTS.values())) -> dict[str, Any]:
-    """Return the section `access_control` of a router's configuration."""
+def access_control(subjects: Iterable[Subject]) -> dict[str, Any]:
+    """Return the section `access_control` of a configuration of a router for `subjects`."""
     rules: list[dict[str, Any]] = []
     known = []
     policies = []

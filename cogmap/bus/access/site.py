@@ -30,8 +30,9 @@ from cogmap.bus.access.keys import (
     ROUTER_CONFIG_NAME,
     Keys,
 )
+from cogmap.bus.access.others import MODULES_NAME, everybody, read
 from cogmap.bus.access.rules import access_control
-from cogmap.bus.access.subjects import ROUTER, SUBJECTS
+from cogmap.bus.access.subjects import ROUTER
 from cogmap.errors import AccessError, StorageError
 
 DAYS = 365
@@ -63,20 +64,27 @@ def make(
     folder: Path,
     now: datetime,
     lasts: timedelta = timedelta(days=DAYS),
+    *,
     hosts: Sequence[str] = (),
     renews_all: bool = False,
+    modules: Path | None = None,
 ) -> list[str]:
     """Make what `folder` lacks of the keys of a site, renew what expires soon, or `renews_all` of
     it, and write the router's configuration. Returns whose certificates are new.
 
     The authority stays. The router's certificate names this machine, `hosts`, and those that it
-    named before. Raises AccessError if the authority's key is not there, StorageError if a file
+    named before. The file `modules` has rows for modules of others, which the folder keeps. Raises
+    AccessError if they are no rows, or the authority's key is not there, and StorageError if a file
     cannot be written.
     """
     try:
         authority = _authority(folder, now)
+        if modules is not None:
+            read(modules)
+            _write(folder / ROUTER / MODULES_NAME, modules.read_bytes(), PUBLIC)
+
         new = []
-        for name in SUBJECTS:
+        for name in everybody(folder / ROUTER):
             named = _hosts(folder, hosts) if name == ROUTER else []
             if renews_all or not _holds(folder, name, authority, now, named):
                 issued = certificates.issue(authority, name, now, lasts, named)
@@ -102,7 +110,7 @@ def router_config(folder: Path) -> dict[str, Any]:
         "scouting": {"multicast": {"enabled": False}, "gossip": {"enabled": False}},
         "adminspace": {"enabled": False},
         "transport": {"link": {"protocols": ["tls"], "tls": keys.to_listen()}},
-        "access_control": access_control(),
+        "access_control": access_control(everybody(folder / ROUTER).values()),
     }
 
 

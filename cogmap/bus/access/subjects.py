@@ -87,7 +87,7 @@ _STREAMED = frozenset(topic for topic in topics.ALL if topic.delivery is not Del
 _CLI = ("cli",)
 
 
-def _module(
+def module_row(
     name: str,
     publishes: Iterable[Topic],
     subscribes: Iterable[Topic],
@@ -110,7 +110,7 @@ def _module(
 
 
 _MODULES = (
-    _module(
+    module_row(
         "sim",
         publishes=(
             topics.CLOCK,
@@ -126,7 +126,7 @@ _MODULES = (
         ),
         subscribes=(topics.MOTOR_COMMAND, topics.PAUSE, topics.RESET, topics.STREET_CLOSURE),
     ),
-    _module(
+    module_row(
         "player",
         publishes=(
             topics.CLOCK,
@@ -143,17 +143,17 @@ _MODULES = (
         ),
         subscribes=(topics.MOTOR_COMMAND, topics.PAUSE),
     ),
-    _module(
+    module_row(
         "sensory",
         publishes=(topics.SELF_MOTION, topics.SCAN, topics.VIEW),
         subscribes=(topics.STEREO, topics.ODOMETRY),
     ),
-    _module(
+    module_row(
         "epam",
         publishes=(topics.PERCEPTS, topics.LEARNED),
         subscribes=(topics.VIEW, topics.COMPETITION, topics.BROADCAST),
     ),
-    _module(
+    module_row(
         "workspace",
         publishes=(
             topics.TASK,
@@ -177,17 +177,17 @@ _MODULES = (
         ),
         answers=(topics.SNAPSHOT_REQUEST,),
     ),
-    _module(
+    module_row(
         "codelets",
         publishes=(topics.PROPOSAL,),
         subscribes=(topics.DELTA, topics.TASK, topics.LEASES),
     ),
-    _module(
+    module_row(
         "global_workspace",
         publishes=(topics.COMPETITION, topics.BROADCAST),
         subscribes=(topics.COALITIONS,),
     ),
-    _module(
+    module_row(
         "memory",
         publishes=(topics.STORED, topics.OFFER),
         subscribes=(
@@ -199,13 +199,13 @@ _MODULES = (
         ),
         remembers=True,
     ),
-    _module(
+    module_row(
         "procedural",
         publishes=(topics.BEHAVIOURS,),
         subscribes=(topics.DELTA, topics.BROADCAST, topics.ACTION),
     ),
-    _module("action", publishes=(topics.ACTION,), subscribes=(topics.BEHAVIOURS,)),
-    _module(
+    module_row("action", publishes=(topics.ACTION,), subscribes=(topics.BEHAVIOURS,)),
+    module_row(
         "motor",
         publishes=(topics.MOTOR_PROGRAM, topics.MOTOR_COMMAND, topics.OFFER),
         subscribes=(
