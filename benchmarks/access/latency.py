@@ -16,7 +16,7 @@ from cogmap.bus.access.certificates import now_utc
 from cogmap.bus.access.keys import Keys
 from cogmap.bus.codec import Envelope
 from cogmap.bus.interface import Arrival
-from cogmap.bus.session import free_endpoint
+from cogmap.bus.session import free_port, listens
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.launch.command_line import cogmap_command, environment
 from cogmap.errors import CogmapError
@@ -28,6 +28,8 @@ COMMAND_BYTES = 300
 DELTA_BYTES = 32 * 1024
 WARM_UP = 100
 TIMEOUT_S = 10.0
+START_S = 30.0
+POLL_S = 0.05
 
 
 class Link:
@@ -104,15 +106,19 @@ def _compared(name: str, links: tuple[Link, Link], payload: bytes, messages: int
 
 @contextmanager
 def _router(keys: str) -> Iterator[str]:
-    """Run a router as a process, as `cogmap run` does; yield its endpoint."""
-    endpoint = free_endpoint()
+    """Run a router as a process, as `cogmap run` does; yield its endpoint once it listens."""
+    port = free_port()
+    endpoint = f"tcp/127.0.0.1:{port}"
     process = subprocess.Popen(
         cogmap_command("router", "--tied", "--connect", endpoint),
         stdin=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
         env=environment() | {KEYS: keys},
     )
+    until_s = time.monotonic() + START_S
     try:
+        while not listens(port) and time.monotonic() < until_s:
+            time.sleep(POLL_S)
         yield endpoint
     finally:
         process.terminate()

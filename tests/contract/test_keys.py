@@ -15,8 +15,10 @@ from cogmap.bus.access.keys import Keys
 from cogmap.bus.interface import Member
 from cogmap.bus.session import free_endpoint, open_client, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.cli.dashboard.live import Connection
 from cogmap.errors import AccessError
 from cogmap.schemas import topics
+from cogmap.schemas.codelets import Offer
 from tests.support.system.networks import routed
 
 AGENT = "agent"
@@ -142,6 +144,18 @@ def test_what_is_not_allowed_is_refused_before_it_is_sent(endpoint: str, folder:
             bus.serve(topics.SETTINGS_REQUEST, topics.SETTINGS, lambda _: None, lambda _: None)  # type: ignore[arg-type, return-value]
         with pytest.raises(AccessError, match="observer may not be motor of motor"):
             bus.announce(Member("motor", "motor"))
+    finally:
+        bus.close()
+
+
+def test_a_dashboard_with_an_observers_keys_shows_and_refuses_clicks(
+    endpoint: str, folder: Path
+) -> None:
+    bus = ZenohBus(endpoint, AGENT, keys=keys_in(folder, "observer"))
+    try:
+        connection = Connection(bus)
+        with pytest.raises(AccessError, match="observer may not publish workspace/offer"):
+            connection.publish(Offer(cycle=1, operations=[]))
     finally:
         bus.close()
 

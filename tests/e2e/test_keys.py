@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks.access import latency
 from tests.support.system.runs import DRIVING, TIMEOUT_S, Run, answered
 
 DRIVE = ("--lockstep", "--set", "sim.sensing=percepts", "--laps", "0.2")
@@ -65,3 +66,10 @@ def test_commands_reach_a_drive_with_keys_by_their_own_alone(
     stranger = asked("topic", "echo", "motor/command", "--once")
     assert stranger.returncode == 2
     assert "asks for keys: name their folder with --keys" in stranger.stderr
+
+
+def test_messages_are_timed_with_keys_and_without(tmp_path: Path) -> None:
+    measured = latency.measure(tmp_path, messages=10)
+
+    assert measured["latency_over_plain"] > 0
+    assert measured["delta_latency_over_plain"] > 0
