@@ -139,7 +139,7 @@ def _distrusted(where: str, host: str, error: ssl.SSLCertVerificationError, keys
 
 def _silent(where: str) -> str:
     return (
-        f"{where} does not speak TLS: start it with --keys too, "
+        f"{where} does not speak TLS, or hangs: start it with --keys too, "
         "or leave --keys and COGMAP_KEYS out here"
     )
 
