@@ -168,13 +168,14 @@ def _holds(folder: Path, name: str, authority: Issued, now: datetime, hosts: Seq
 
 
 def _hosts(folder: Path, given: Sequence[str]) -> list[str]:
-    """Return all hosts that the router's certificate is to name."""
-    before = []
+    """Return all hosts that the router's certificate is to name: also this machine's name where it
+    has none yet, but not that of a container in which it is renewed.
+    """
+    named = [socket.gethostname()]
     with suppress(AccessError):
         certificate = certificates.read_certificate(folder / ROUTER / CERTIFICATE_NAME)
-        before = certificates.hosts_of(certificate)
-    own = ["localhost", "127.0.0.1", "::1", socket.gethostname()]
-    return list(dict.fromkeys([*own, *before, *given]))
+        named = certificates.hosts_of(certificate)
+    return list(dict.fromkeys(["localhost", "127.0.0.1", "::1", *named, *given]))
 
 
 def _pem(authority: Issued) -> bytes:

@@ -132,3 +132,15 @@ def test_the_rules_deny_what_they_do_not_name(tmp_path: Path) -> None:
     assert access["default_permission"] == "deny"
     assert {rule["permission"] for rule in access["rules"]} == {"allow"}
     assert config["transport"]["link"]["tls"]["enable_mtls"]
+
+
+def test_a_site_renewed_elsewhere_names_no_other_machine(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site.make(tmp_path, NOW)
+    monkeypatch.setattr("socket.gethostname", lambda: "container-2")
+
+    assert site.make(tmp_path, NOW) == []
+    site.make(tmp_path, NOW, renews_all=True)
+    read = certificates.read_certificate(tmp_path / "router" / "certificate.pem")
+    assert "container-2" not in certificates.hosts_of(read)
