@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 from cogmap.runtime.pausing import Pausing
+from cogmap.runtime.repetition import Repetition
 from cogmap.schemas.base import Message
-from cogmap.schemas.process import Clock, Pause
+from cogmap.schemas.process import Clock, Pause, Presence
 from cogmap.schemas.sensing import MotorCommand
 from cogmap.services.player.playhead import Playhead
-
-# How often the wait for a command is looked at: a tenth of REPEAT_AFTER_NS.
-REPEAT_CHECK_NS = 1_000_000_000
-
-REPEAT_AFTER_NS = 10_000_000_000
-"""Wall time without a motor command after which a view is published again, as the simulation does:
-no cycle of a loaded machine takes as long, and a module that was restarted is back within it.
-"""
 
 
 class Lockstep:
@@ -30,11 +23,12 @@ class Lockstep:
         self._is_answered = False
         self._view_ns: int | None = None
         self._sensed: list[Message] = []
-        self._timed_view_ns: int | None = None
-        self._waiting_since_ns = 0
+        self._repetition = Repetition()
 
     def on_start(self) -> list[Message]:
         """Return what really stood there, if that is known, and the first view."""
+        if self._playhead.is_resumed:
+            self._repetition.doubt()
         return [*self._playhead.town(), *self._advance()]
 
     def on_command(self, command: MotorCommand) -> list[Message] | None:
@@ -47,6 +41,7 @@ class Lockstep:
             return None
 
         self._is_answered = True
+        self._repetition.on_answer()
         return self._next()
 
     def on_pause(self, pause: Pause) -> list[Message]:
@@ -54,24 +49,21 @@ class Lockstep:
         self._pausing.on_pause(pause)
         return [self._pausing.said(self._view_ns or 0), *self._next()]
 
+    def on_presence(self, presence: Presence) -> None:
+        """Note who leaves, and who comes back and may have lost what was sensed."""
+        self._repetition.on_presence(presence)
+
     def on_timer(self, wall_ns: int) -> list[Message]:
-        """Return what was sensed last once more if no command has answered it for REPEAT_AFTER_NS
-        of wall time: a module that was killed may have lost it.
+        """Return what was sensed last once more if no command has answered it for longer than
+        cycles take: a module that was killed may have lost it.
         """
         if self._view_ns is None or self._playhead.is_over:
             return []
         if self._is_answered:
             return list(self._pausing.said_again(self._view_ns, wall_ns))
 
-        if self._timed_view_ns != self._view_ns:
-            self._timed_view_ns = self._view_ns
-            self._waiting_since_ns = wall_ns
-
-        if wall_ns - self._waiting_since_ns < REPEAT_AFTER_NS:
-            return []
-
-        self._waiting_since_ns = wall_ns
-        return self._sensed
+        is_due = self._repetition.is_due(self._view_ns, wall_ns)
+        return self._sensed if is_due else []
 
     def _next(self) -> list[Message]:
         """Return what comes next, if the last view is answered and time does not stand."""

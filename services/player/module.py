@@ -6,12 +6,13 @@ from __future__ import annotations
 
 from cogmap.errors import ConfigError
 from cogmap.runtime.module import Module
+from cogmap.runtime.repetition import CHECK_NS
 from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.services.player import formats
 from cogmap.services.player.config import Config
-from cogmap.services.player.lockstep import REPEAT_CHECK_NS, Lockstep
+from cogmap.services.player.lockstep import Lockstep
 from cogmap.services.player.playhead import Playhead
 from cogmap.services.player.real_time import PERIOD_NS, RealTime
 
@@ -52,10 +53,11 @@ def build(config: Config, instance: str = NAME, run: Run = REAL_TIME) -> Module:
     required = run.participants or {NAME: 1}
     if run.lockstep:
         lockstep = Lockstep(playhead)
+        module.on(topics.PRESENCE, lockstep.on_presence, [topics.PRESENCE])
         module.on(topics.MOTOR_COMMAND, lockstep.on_command, _EMITS)
         module.on(topics.PAUSE, lockstep.on_pause, _EMITS)
         module.on_start(lockstep.on_start, required, _EMITS)
-        return module.every(REPEAT_CHECK_NS, lockstep.on_timer, _EMITS)
+        return module.every(CHECK_NS, lockstep.on_timer, _EMITS)
 
     real_time = RealTime(playhead, config.speed)
     module.on(topics.MOTOR_COMMAND, real_time.on_command, _EMITS)

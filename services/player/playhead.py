@@ -40,11 +40,13 @@ class Playhead:
         self._skipped = 0
         self._reasons: list[str] = [*recording.notes]
         self.is_over = False
+        self.is_resumed = False
 
     def resume(self, past: Iterable[Message]) -> None:
         """Continue after the last view that was published; what was over stays over."""
         for message in past:
             if isinstance(message, Playback):
+                self.is_resumed = True
                 self._reasons = []
                 self._views = message.views
                 self._skipped = message.skipped

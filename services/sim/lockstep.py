@@ -3,18 +3,11 @@
 from __future__ import annotations
 
 from cogmap.runtime.pausing import Pausing
+from cogmap.runtime.repetition import Repetition
 from cogmap.schemas.base import Message
-from cogmap.schemas.process import Pause
+from cogmap.schemas.process import Pause, Presence
 from cogmap.schemas.sensing import MotorCommand
 from cogmap.services.sim.simulation import Simulation
-
-# How often the wait for a command is looked at: a tenth of REPEAT_AFTER_NS.
-REPEAT_CHECK_NS = 1_000_000_000
-
-REPEAT_AFTER_NS = 10_000_000_000
-"""Wall time without a motor command after which a frame is published again: no cycle of a loaded
-machine takes as long, and a module that was restarted is back within it.
-"""
 
 
 class Lockstep:
@@ -28,11 +21,12 @@ class Lockstep:
         self._is_answered = False
         self._frame_ns: int | None = None
         self._senses: list[Message] = []
-        self._timed_frame_ns: int | None = None
-        self._waiting_since_ns = 0
+        self._repetition = Repetition()
 
     def on_start(self) -> list[Message]:
         """Return the town, and the first frame."""
+        if self._simulation.is_resumed:
+            self._repetition.doubt()
         return [self._simulation.town(), *self._advance()]
 
     def on_command(self, command: MotorCommand) -> list[Message] | None:
@@ -46,6 +40,7 @@ class Lockstep:
 
         self._simulation.drive(command)
         self._is_answered = True
+        self._repetition.on_answer()
         return self._next()
 
     def on_pause(self, pause: Pause) -> list[Message]:
@@ -53,25 +48,21 @@ class Lockstep:
         self._pausing.on_pause(pause)
         return [self._pausing.said(self._simulation.now_ns), *self._next()]
 
+    def on_presence(self, presence: Presence) -> None:
+        """Note who leaves, and who comes back and may have lost what was sensed."""
+        self._repetition.on_presence(presence)
+
     def on_timer(self, wall_ns: int) -> list[Message]:
         """Return the last frame and its odometry once more if no command has answered it for
-        REPEAT_AFTER_NS of wall time: a module that was killed may have lost it.
+        longer than cycles take: a module that was killed may have lost it.
         """
         if self._frame_ns is None or self._simulation.progress >= 1.0:
             return []
         if self._is_answered:
             return list(self._pausing.said_again(self._simulation.now_ns, wall_ns))
 
-        if self._timed_frame_ns != self._frame_ns:
-            self._timed_frame_ns = self._frame_ns
-            self._waiting_since_ns = wall_ns
-
-        if wall_ns - self._waiting_since_ns < REPEAT_AFTER_NS:
-            return []
-
-        self._waiting_since_ns = wall_ns
-
-        return self._senses
+        is_due = self._repetition.is_due(self._frame_ns, wall_ns)
+        return self._senses if is_due else []
 
     def _next(self) -> list[Message]:
         """Return the next frame, if the last one is answered and time does not stand."""

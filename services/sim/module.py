@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from cogmap.robot import calibration
 from cogmap.runtime.module import Module
+from cogmap.runtime.repetition import CHECK_NS
 from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
 from cogmap.services.sim.battery import Battery
@@ -11,7 +12,7 @@ from cogmap.services.sim.config import ODOMETRY_HZ, Config, check, place_of
 from cogmap.services.sim.drivers.kinematic import KinematicRobot
 from cogmap.services.sim.drivers.line_follower import LineFollower
 from cogmap.services.sim.layout.network import StreetNetwork
-from cogmap.services.sim.lockstep import REPEAT_CHECK_NS, Lockstep
+from cogmap.services.sim.lockstep import Lockstep
 from cogmap.services.sim.percept_level.line_sensors import LineSensors
 from cogmap.services.sim.percept_level.senses import PerceptSenses
 from cogmap.services.sim.percept_level.street_sensors import StreetSensors
@@ -66,10 +67,11 @@ def build(config: Config, instance: str = "sim", run: Run = REAL_TIME) -> Module
     required = run.participants or {"sim": 1}
     if run.lockstep:
         lockstep = Lockstep(simulation)
+        module.on(topics.PRESENCE, lockstep.on_presence, [topics.PRESENCE])
         module.on(topics.MOTOR_COMMAND, lockstep.on_command, emits)
         module.on(topics.PAUSE, lockstep.on_pause, emits)
         module.on_start(lockstep.on_start, required, emits)
-        return module.every(REPEAT_CHECK_NS, lockstep.on_timer, emits)
+        return module.every(CHECK_NS, lockstep.on_timer, emits)
 
     real_time = RealTime(simulation)
     module.on(topics.MOTOR_COMMAND, real_time.on_command)

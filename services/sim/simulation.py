@@ -94,6 +94,7 @@ class Simulation:
         self.tick_ns = 1_000_000_000 // (config.frame_hz * ticks_per_frame)
         self.now_ns = 0
         self.progress = 0.0
+        self.is_resumed = False
         self.driver = driver
         self.senses = senses
 
@@ -124,6 +125,7 @@ class Simulation:
         if not isinstance(last, TruePose):
             return
 
+        self.is_resumed = True
         self.driver.resume(last)
         self._is_over = last.progress >= 1.0
         self._power.resume(last.energy)

@@ -17,17 +17,21 @@ from typing import IO
 import msgspec
 
 from cogmap.cli.launch.command_line import environment
-from cogmap.cli.launch.forking.server import MAX_BYTES, Request, report_decoder
+from cogmap.cli.launch.forking.server import MAX_BYTES, Report, Request, report_decoder
 
 # Room for the command lines of those that are forked: see `show_command_line`.
 _ROOM = " " * 4096
+UNKNOWN_CODE = -signal.SIGKILL
+"""As of one that was killed: it is started again."""
+
 _SERVER = (sys.executable, "-P", "-m", "cogmap.cli.launch.forking.server")
 
 
 class Forked:
     """A process that a fork server was asked for, with the interface of subprocess.Popen.
 
-    Its standard input is the pipe `stdin`.
+    Its standard input is the pipe `stdin`. It outlives the server: its end is seen then, but not
+    its exit code, in the place of which is UNKNOWN_CODE.
     """
 
     def __init__(self, server: ForkServer, stdin: IO[bytes]) -> None:
@@ -35,17 +39,19 @@ class Forked:
         self.started: int | None = None
         self.code: int | None = None
         self._server = server
+        self._handle: int | None = None
+        self._is_orphan = False
 
     @property
     def pid(self) -> int:
         """Return the process id; 0 if it was never started, as the server has ended."""
         while self.started is None and self.code is None:
-            self._server.receive(None)
+            self._receive(None)
         return self.started or 0
 
     def poll(self) -> int | None:
         """Return the exit code; None while it runs."""
-        self._server.receive(0.0)
+        self._receive(0.0)
         return self.code
 
     def wait(self, timeout: float) -> int:
@@ -53,7 +59,7 @@ class Forked:
         deadline_s = time.monotonic() + timeout
         while self.code is None:
             left_s = deadline_s - time.monotonic()
-            self._server.receive(max(0.0, left_s))
+            self._receive(max(0.0, left_s))
             if left_s <= 0 and self.code is None:
                 raise subprocess.TimeoutExpired("cogmap", timeout)
         return self.code
@@ -66,11 +72,43 @@ class Forked:
         """Send SIGKILL."""
         self._send(signal.SIGKILL, self.pid)
 
-    def lose(self) -> None:
-        """End it: nobody would report its end."""
+    def note(self, report: Report) -> None:
+        """Take account of what the server reports of it."""
+        self.started = report.pid
+        self.code = report.code
+        if self.code is None:
+            with suppress(ProcessLookupError):  # its end is reported next
+                self._handle = os.pidfd_open(report.pid)
+        else:
+            self._close_handle()
+
+    def lose_server(self) -> None:
+        """Take account that nobody reports its end any more; one that has not
+        started never will."""
+        self._is_orphan = True
+        if self._handle is None:
+            self.stdin.close()
+            self.code = UNKNOWN_CODE
+
+    def end(self) -> None:
+        """Kill it."""
         self.stdin.close()
         self._send(signal.SIGKILL, self.started)
-        self.code = -signal.SIGKILL
+        self.code = UNKNOWN_CODE
+        self._close_handle()
+
+    def _receive(self, timeout_s: float | None) -> None:
+        """Take account of what the server reports or, where that has ended, look oneself."""
+        if not self._is_orphan:
+            self._server.receive(timeout_s)
+        elif self._handle is not None and _is_ready(self._handle, timeout_s):
+            self.code = UNKNOWN_CODE
+            self._close_handle()
+
+    def _close_handle(self) -> None:
+        if self._handle is not None:
+            os.close(self._handle)
+            self._handle = None
 
     def _send(self, number: signal.Signals, pid: int | None) -> None:
         if self.code is None and pid:
@@ -81,22 +119,13 @@ class Forked:
 class ForkServer:
     """A fork server in a process of its own, which ends with this one. Linux only.
 
-    Where it has died, all that it had started is ended too, and `is_alive` is False.
+    Where it has died, what it had started runs on, and another one is started; if it had started
+    nothing, none is, for that would die too, and `is_alive` is False.
     """
 
     def __init__(self) -> None:
-        self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._forked: list[Forked] = []
-        self.is_alive = True
-        with theirs:
-            self._process = subprocess.Popen(
-                [*_SERVER, str(theirs.fileno()), _ROOM],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                env=environment(),
-                pass_fds=[theirs.fileno()],
-                start_new_session=True,
-            )
+        self._start()
 
     @property
     def pid(self) -> int:
@@ -115,28 +144,32 @@ class ForkServer:
         try:
             socket.send_fds(self._channel, [msgspec.msgpack.encode(request)], [source, output])
         except OSError:
-            self._lose()
+            self._replace()
         finally:
             os.close(source)
         return forked
 
     def receive(self, timeout_s: float | None) -> None:
         """Take account of what the server reports, waiting so long for the first."""
-        while self.is_alive and _is_ready(self._channel, timeout_s):
-            payload = self._channel.recv(MAX_BYTES)
+        while self.is_alive and _is_ready(self._channel.fileno(), timeout_s):
+            payload = b""
+            with suppress(ConnectionResetError):  # it has died before it read what it was asked for
+                payload = self._channel.recv(MAX_BYTES)
             if not payload:
-                self._lose()
+                self._replace()
                 return
 
             report = report_decoder.decode(payload)
-            forked = self._forked[report.number]
-            forked.started = report.pid
-            forked.code = report.code
+            self._forked[report.number].note(report)
+            self._has_forked = True
             timeout_s = 0.0
 
     def close(self) -> None:
         """End the server, and what it started and has not ended."""
-        self._lose()
+        self._end()
+        for forked in self._forked:
+            if forked.code is None:
+                forked.end()
 
     def __enter__(self) -> ForkServer:
         return self
@@ -149,14 +182,35 @@ class ForkServer:
     ) -> None:
         self.close()
 
-    def _lose(self) -> None:
+    def _start(self) -> None:
+        self._channel, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._has_forked = False
+        self.is_alive = True
+        with theirs:
+            self._process = subprocess.Popen(
+                [*_SERVER, str(theirs.fileno()), _ROOM],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                env=environment(),
+                pass_fds=[theirs.fileno()],
+                start_new_session=True,
+            )
+
+    def _end(self) -> None:
         self.is_alive = False
         self._channel.close()
         self._process.kill()
         self._process.wait()
+
+    def _replace(self) -> None:
+        """Start another server in the place of one that has died."""
+        self._end()
         for forked in self._forked:
             if forked.code is None:
-                forked.lose()
+                forked.lose_server()
+
+        if self._has_forked:
+            self._start()
 
 
 def fork_server() -> AbstractContextManager[ForkServer | None]:
@@ -164,6 +218,6 @@ def fork_server() -> AbstractContextManager[ForkServer | None]:
     return ForkServer() if sys.platform == "linux" else nullcontext()
 
 
-def _is_ready(channel: socket.socket, timeout_s: float | None) -> bool:
-    ready, _, _ = select.select([channel], [], [], timeout_s)
+def _is_ready(descriptor: int, timeout_s: float | None) -> bool:
+    ready, _, _ = select.select([descriptor], [], [], timeout_s)
     return bool(ready)

@@ -9,11 +9,12 @@ import pytest
 from cogmap.bus.codec import encode
 from cogmap.errors import ConfigError, UsageError
 from cogmap.runtime.module import Module
+from cogmap.runtime.repetition import CHECK_NS, REPEAT_AFTER_NS
 from cogmap.runtime.run import LOCKSTEP, REAL_TIME, Run
 from cogmap.schemas.base import Message
 from cogmap.schemas.process import Clock, Pause, Paused, Playback
 from cogmap.schemas.sensing import MotorCommand, Percepts, StereoFrame, TrueTown
-from cogmap.services.player.lockstep import REPEAT_AFTER_NS, REPEAT_CHECK_NS, Lockstep
+from cogmap.services.player.lockstep import Lockstep
 from cogmap.services.player.module import Config, build
 from cogmap.services.player.playhead import Playhead
 from cogmap.services.player.real_time import LAST_ANSWER_NS, PERIOD_NS, RealTime
@@ -87,8 +88,8 @@ def test_lockstep_repeats_a_view_that_nobody_answers_but_no_truth() -> None:
     first = lockstep.on_start()
 
     repeated: list[Message] = []
-    for tick in range(REPEAT_AFTER_NS // REPEAT_CHECK_NS + 1):
-        repeated += lockstep.on_timer(START_NS + tick * REPEAT_CHECK_NS)
+    for tick in range(REPEAT_AFTER_NS // CHECK_NS + 1):
+        repeated += lockstep.on_timer(START_NS + tick * CHECK_NS)
 
     assert repeated == [message for message in first if message in repeated]
     assert of_type(Playback, repeated) == []

@@ -101,7 +101,7 @@ def test_what_a_fork_server_had_forked_ends_with_it(fork: Fork, server: ForkServ
     wait_until(lambda: not is_running(pid), "it ends")
 
 
-def test_a_supervisor_goes_on_without_a_fork_server_that_was_killed(
+def test_what_a_fork_server_had_started_runs_on_where_it_is_killed(
     server: ForkServer, tmp_path: Path
 ) -> None:
     command = cogmap_command(*router(free_endpoint()))
@@ -110,18 +110,64 @@ def test_a_supervisor_goes_on_without_a_fork_server_that_was_killed(
     supervisor.start(Program("router", lambda starts: command))
     wait_until(lambda: listens(log), "the router is up")
     first = supervisor.children["router"].pid
+    killed = server.pid
 
-    os.kill(server.pid, signal.SIGKILL)
+    os.kill(killed, signal.SIGKILL)
+
+    def has_another() -> bool:
+        supervisor.check()
+        return server.pid != killed
+
+    wait_until(has_another, "there is another fork server")
+    assert is_running(first)
+    assert supervisor.restarts == {}
+
+    os.kill(first, signal.SIGKILL)
 
     def is_back() -> bool:
         supervisor.check()
         return listens(log, times=2)
 
     wait_until(is_back, "another router is up")
-    assert not is_running(first)
+    assert server.is_alive
     assert supervisor.restarts == {"router": 1}
     supervisor.end(["router"], TIMEOUT_S)
     assert supervisor.killed == []
+
+
+def test_a_process_is_asked_to_end_though_its_fork_server_was_killed(
+    fork: Fork, server: ForkServer, tmp_path: Path
+) -> None:
+    forked = fork(*router(free_endpoint()))
+    wait_until(lambda: listens(tmp_path / "log"), "the router is up")
+    pid = forked.pid
+    killed = server.pid
+    os.kill(killed, signal.SIGKILL)
+
+    def is_noticed() -> bool:
+        assert forked.poll() is None
+        return server.pid != killed
+
+    wait_until(is_noticed, "the server's end is noticed")
+    forked.terminate()
+
+    forked.wait(TIMEOUT_S)
+    assert not is_running(pid)
+
+
+def test_a_fork_server_that_can_start_nothing_is_not_started_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "msgspec.py").write_text("raise ImportError('nothing works here')\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    command = cogmap_command("version")
+    with ForkServer() as server:
+        with (tmp_path / "log").open("ab") as log:
+            lost = server.fork(command, log.fileno())
+
+        assert lost.wait(TIMEOUT_S) == -signal.SIGKILL
+        assert lost.pid == 0
+        assert not server.is_alive
 
 
 @pytest.fixture
