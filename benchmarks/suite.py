@@ -20,6 +20,7 @@ from benchmarks.cycle import measure as cycle
 from benchmarks.dashboard import measure as dashboard
 from benchmarks.explore import measure as explore
 from benchmarks.export import measure as export
+from benchmarks.faults import measure as faults
 from benchmarks.individuals import measure as individuals
 from benchmarks.learning import measure as learning
 from benchmarks.lifelong import measure as lifelong
@@ -165,6 +166,13 @@ SUITE = (
     Benchmark("lifelong", lifelong.THRESHOLDS, lifelong.measure, options=lifelong.OPTIONS),
     Benchmark("dashboard", dashboard.THRESHOLDS, dashboard.measure, options=dashboard.OPTIONS),
     Benchmark("export", export.THRESHOLDS, export.measure, options=export.OPTIONS),
+    Benchmark(
+        "faults",
+        faults.THRESHOLDS,
+        faults.measure,
+        options=faults.OPTIONS,
+        option_thresholds=faults.PART_THRESHOLDS,
+    ),
     Benchmark("ros2", ros2.THRESHOLDS, ros2.measure),
     Benchmark("log_api", log_api.THRESHOLDS, log_api.measure, options=log_api.OPTIONS),
     Benchmark(

@@ -1,0 +1,1 @@
+"""Kills processes of real drives at any time, and looks for what that lost."""
