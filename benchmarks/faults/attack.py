@@ -16,7 +16,7 @@ from typing import Any
 
 import psutil
 
-from benchmarks.faults.parts import FORK_SERVER, ROUTER, all_at, kill, pids_of
+from benchmarks.faults.parts import FORK_SERVER, ROUTER, all_at, is_idle, kill, pids_of
 from benchmarks.faults.witness import Seen, Witness
 from cogmap.bus.session import free_endpoint, listens
 from cogmap.cli.launch.supervisor import MAX_QUICK_DEATHS, STEADY_S
@@ -36,6 +36,9 @@ QUIET_S = 1.0
 QUIET_LIMIT_S = 30.0
 ORPHANS_S = 5.0
 LOOK_S = 0.05
+IDLE_LOOKS = 6
+"""So often in a row a fork server must be idle that it is not only reading a file."""
+
 TOWN_M = 120
 EXPLORE_S = 100_000
 FOLDER = "drive"
@@ -167,6 +170,7 @@ class _Attacker:
         self._endpoint = endpoint
         self._random = random
         self._deaths_s: dict[str, list[float]] = {}
+        self._idle_looks = 0
 
     def kill(self, part: str) -> Kill | None:
         """Kill a part at some time, and wait until the drive goes on as before; None where it has
@@ -212,10 +216,17 @@ class _Attacker:
         return self._witness.seen.commands_s
 
     def _is_back(self, part: str, killed: list[int], arrivals: int) -> bool:
-        """Decide whether a part is there again: by its presence, if it has one."""
+        """Decide whether a part is there again: by its presence if it has one; a fork server once
+        it has prepared what it may fork.
+        """
         if part not in {ROUTER, FORK_SERVER}:
             return self._witness.present[part] > arrivals
-        return bool(set(pids_of(self._endpoint, part)) - set(killed))
+
+        others = set(pids_of(self._endpoint, part)) - set(killed)
+        if part == ROUTER:
+            return bool(others)
+        self._idle_looks = self._idle_looks + 1 if any(map(is_idle, others)) else 0
+        return self._idle_looks >= IDLE_LOOKS
 
 
 def _rest_s(deaths_s: list[float]) -> float:

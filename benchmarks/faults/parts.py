@@ -47,6 +47,15 @@ def all_at(endpoint: str) -> list[int]:
     return pids
 
 
+def is_idle(pid: int) -> bool:
+    """Decide whether a process waits, as a fork server does that has imported all."""
+    try:
+        status: str = psutil.Process(pid).status()
+    except psutil.NoSuchProcess:
+        return False
+    return status == psutil.STATUS_SLEEPING
+
+
 def kill(pid: int) -> None:
     """Send SIGKILL."""
     os.kill(pid, signal.SIGKILL)

@@ -122,7 +122,8 @@ class Child:
         return self._process.pid
 
     def restart_if_dead(self) -> bool:
-        """Start it again some time after it died, later each time. Returns whether that was now.
+        """Start it again after it died: at once if it had lived for STEADY_S, else later each time.
+        Returns whether that was now.
 
         Raises ProcessFailedError with its last words if a restart would not help: it ended with
         USAGE_EXIT, or has died MAX_QUICK_DEATHS times within STEADY_S of its start.
@@ -150,7 +151,7 @@ class Child:
 
         now_s = time.monotonic()
         if now_s - self._started_s > STEADY_S:
-            self._backoff_s = MIN_BACKOFF_S
+            self._backoff_s = 0.0
             self._quick_deaths = 0
 
         self._quick_deaths += 1
@@ -161,7 +162,7 @@ class Child:
             )
 
         backoff_s = self._backoff_s
-        self._backoff_s = min(MAX_BACKOFF_S, 2 * backoff_s)
+        self._backoff_s = min(MAX_BACKOFF_S, max(MIN_BACKOFF_S, 2 * backoff_s))
         return now_s + backoff_s
 
     def ask_to_end(self) -> None:

@@ -44,6 +44,7 @@ class Repetition:
         self._view_ns: int | None = None
         self._since_ns = 0
         self._asked_ns = 0
+        self._begins_anew = False
         self._waits_ns: deque[int] = deque(maxlen=KEPT_WAITS)
 
     def on_presence(self, presence: Presence) -> None:
@@ -55,8 +56,11 @@ class Repetition:
             self.doubt()
 
     def doubt(self) -> None:
-        """Take account that messages may be lost, as after a restart of whoever publishes views."""
+        """Take account that messages may be lost, as after a restart of whoever publishes views.
+        The wait begins anew: whoever has come back may have something to do yet.
+        """
         self._doubted = DOUBTED_VIEWS
+        self._begins_anew = True
 
     def on_answer(self) -> None:
         """Note that the newest view is answered."""
@@ -71,6 +75,10 @@ class Repetition:
                 self._waits_ns.append(wall_ns - self._since_ns)
             self._view_ns = view_ns
             self._since_ns = wall_ns
+            self._begins_anew = True
+
+        if self._begins_anew:
+            self._begins_anew = False
             self._asked_ns = wall_ns
 
         if wall_ns - self._asked_ns < self._patience_ns:
