@@ -128,8 +128,8 @@ def attack(
 def _words(folder: Path, endpoint: str, seed: int, is_lockstep: bool) -> list[str]:
     words = ["--out", str(folder), "--connect", endpoint, "--agent", AGENT, "--seed", str(seed)]
     words += ["--town", "blocks", "--explore", str(EXPLORE_S), "--codelets", "2"]
-    words += ["--set", "sim.sensing=percepts", "--set", f"sim.town_size_m={TOWN_M}"]
-    words += ["--lockstep"] if is_lockstep else ["--set", "run.lockstep=false"]
+    words += ["--set", f"sim.town_size_m={TOWN_M}"]
+    words += ["--lockstep", "--set", "sim.sensing=percepts"] if is_lockstep else []
     return words
 
 

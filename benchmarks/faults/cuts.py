@@ -12,6 +12,9 @@ from mcap.stream_reader import StreamReader
 
 from cogmap.recording.storage.recover import recover
 
+MOST_BYTES = 32 * 2**20
+"""Of a larger log, only the beginning is cut."""
+
 # The magic bytes, before which there is no log.
 _LEAST_BYTES = 8
 
@@ -25,12 +28,13 @@ def recovered_share(path: Path, cuts: int, random: Random, folder: Path) -> floa
     Returns the smallest share of the messages that a reader of the format finds whole, and which
     the recovered log holds; 1 where there is none.
     """
-    content = path.read_bytes()
+    with path.open("rb") as file:
+        content = file.read(MOST_BYTES)
     shares = [1.0]
     for cut in range(cuts):
         cut_path = folder / f"{path.stem}-cut-{cut}.mcap"
         saved_path = folder / f"{path.stem}-saved-{cut}.mcap"
-        cut_path.write_bytes(content[: random.randrange(_LEAST_BYTES, len(content))])
+        cut_path.write_bytes(content[: random.randint(_LEAST_BYTES, len(content))])
         whole = messages_in(cut_path)
         recover(cut_path, saved_path)
         if whole:

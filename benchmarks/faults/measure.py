@@ -92,12 +92,12 @@ def measure(
     """Kill processes of real drives at random times, and count what that loses.
 
     Every process in turn is killed by `kill -9`, the fork server, the router and the recorder
-    included, while an agent explores a small town at the level of percepts. A drive is attacked 42
-    times at most; then time stands, its graphs are compared, it ends, and its logs, journal and
-    database are read. `back_s` is the longest wait for a motor command from a kill until five
-    commands after the killed one is back; one of over 20 s has stalled the drive. Logs are cut at
-    three random places each, and recovered. Takes about 15 minutes; on a machine that is busy
-    otherwise, times say nothing.
+    included, while an agent explores a small town: in lockstep at the level of percepts, in real
+    time with cameras. A drive is attacked 42 times at most; then time stands, its graphs are
+    compared, it ends, and its logs, journal and database are read. `back_s` is the longest wait for
+    a motor command from a kill until five commands after the killed one is back; one of over 20 s
+    has stalled the drive. Logs are cut at three random places each, and recovered. Takes about 20
+    minutes; on a machine that is busy otherwise, times say nothing.
     """
     modes = [True, False] if is_lockstep is None else [is_lockstep]
     campaign = Campaign(setting.folder, only or PARTS, seed, time.monotonic() + limit_s)

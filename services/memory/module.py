@@ -41,6 +41,13 @@ class CompetitionGate:
         """Note that a broadcast has come."""
         self._broadcast_cycle = broadcast.cycle
 
+    def resume(self, cycle: int) -> None:
+        """Go on in `cycle`, after a restart, or if something was lost: wait for nothing that was
+        published before.
+        """
+        self._competition_cycle = max(self._competition_cycle, cycle - 1)
+        self._awaits_broadcast = False
+
     def is_open(self, cycle: int) -> bool:
         """Decide whether what follows from the end of `cycle` may be computed."""
         is_behind = self._broadcast_cycle < self._competition_cycle
@@ -116,6 +123,7 @@ class LongTermMemory:
 
     def on_load(self) -> list[Message]:
         """Take up a graph that was loaded as a whole, which may have ended a cycle."""
+        self._gate.resume(self._graph.cycle)
         self._spatial.note_all()
         self._episodic.note_all()
         if self._graph.phase is not Phase.END:

@@ -31,6 +31,7 @@ from cogmap.services.motor.reactive.stuck import StuckDetector
 __all__ = ["Config", "MotorModule", "build"]
 
 POSE_PHASES = frozenset({Phase.LOCALIZATION, Phase.LATE})
+BEFORE_POSE = frozenset({Phase.PERCEPTS, Phase.CORRECTION})
 
 
 class Estimate(NamedTuple):
@@ -64,6 +65,7 @@ class MotorModule:
         self._graph = graph
         self._execution = Execution(config, run)
         self._is_resumed = False
+        self._has_joined = False
         self._clear_m = math.inf
         self._newest_ns = 0
         self._waiting: Estimate | None = None
@@ -144,15 +146,36 @@ class MotorModule:
         agent = agents[-1]
         pose = Pose(x_m=agent.x_m, y_m=agent.y_m, heading_rad=agent.heading_rad)
         self._waiting = Estimate(delta.stamp_ns, delta.cycle, pose, plan)
-        if self._is_resumed:
+        if self._is_resumed or self._has_joined:
             self._gate.resume(delta.cycle)
             self._is_resumed = False
+            self._has_joined = False
 
         return self._replies(at_once=is_repeated and is_pose_of_view)
 
-    def on_load(self) -> None:
-        """Take up the plan of a graph that was loaded as a whole."""
-        self._execution.take(self._graph.get(Plan, PLAN_ID), self._graph.agent)
+    def on_load(self) -> list[Message]:
+        """Take up the plan of a graph that was loaded as a whole.
+
+        In lockstep its pose is answered too if none as new was: whoever loads it was restarted, or
+        has lost the delta of that pose, and nobody else will answer it.
+        """
+        graph = self._graph
+        plan = graph.get(Plan, PLAN_ID)
+        agent = graph.agent
+        self._execution.take(plan, agent)
+        if agent is None or not self._is_lockstep:
+            return []
+
+        answered = self._answered
+        if answered is not None and agent.stamp_ns <= answered.stamp_ns:
+            return []
+
+        cycle = graph.cycle - 1 if graph.phase in BEFORE_POSE else graph.cycle
+        pose = Pose(x_m=agent.x_m, y_m=agent.y_m, heading_rad=agent.heading_rad)
+        self._waiting = Estimate(agent.stamp_ns, cycle, pose, plan)
+        self._has_joined = True
+        self._gate.resume(cycle)
+        return self._replies()
 
     def on_competition(self, competition: Competition) -> list[Message]:
         """Note that a cycle's competition has ended."""

@@ -125,6 +125,7 @@ class ForkServer:
 
     def __init__(self) -> None:
         self._forked: list[Forked] = []
+        self.is_alive = False
         self._start()
 
     @property

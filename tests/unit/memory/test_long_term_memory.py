@@ -315,6 +315,14 @@ def test_a_repeated_scan_releases_the_offer_that_waits_for_a_lost_competition() 
     assert len(of_type(Offer, mind.module.feed(scan))) == 1
 
 
+def test_in_lockstep_one_that_joins_in_a_cycle_waits_for_no_competition_before_it() -> None:
+    mind = Mind()
+    mind.commit(5, agent())
+    assert mind.module.loaded() == []
+
+    assert [offer.cycle for offer in of_type(Offer, mind.end(5))] == [5]
+
+
 def test_in_real_time_nothing_is_offered_where_nothing_is_recalled() -> None:
     mind = Mind(run=REAL_TIME)
 

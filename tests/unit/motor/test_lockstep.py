@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from cogmap.runtime.module import Module
 from cogmap.runtime.run import LOCKSTEP
+from cogmap.schemas.codelets import Offer
 from cogmap.schemas.cognition import ActionName, MotorProgram, Trigger
+from cogmap.schemas.graph import Delta, Phase
 from cogmap.schemas.sensing import MotorCommand, SpeedLimit
+from cogmap.testing import agent
 from tests.support.world.motor import (
     PERIOD_NS,
     action_of,
@@ -13,12 +16,14 @@ from tests.support.world.motor import (
     commands_in,
     competition_of,
     module_ahead,
+    module_without_plan,
     motion_of,
     no_action_of,
     plan_delta,
     pose_delta,
     scan_of,
 )
+from tests.support.world.plans import plan_along
 
 
 def test_in_lockstep_a_plan_that_comes_after_the_pose_waits_for_the_next_one() -> None:
@@ -169,6 +174,56 @@ def test_in_lockstep_a_restarted_module_without_a_pose_halts_for_a_frame() -> No
     command = command_after(module, scan_of(cycle=6))
     assert command.stamp_ns == 6 * PERIOD_NS
     assert command.halted_by is SpeedLimit.NO_POSE
+
+
+def _joining(stamp_ns: int, phase: Phase, cycle: int = 6) -> Module:
+    """A module in lockstep that joins a running system, whose graph is at a phase of a cycle."""
+    module = module_without_plan(LOCKSTEP)
+    assert module.graph is not None
+    past = Delta(
+        stamp_ns=stamp_ns,
+        version=1,
+        cycle=cycle,
+        phase=phase,
+        operations=[agent(stamp_ns=stamp_ns), plan_along((0.0, 0.0), (20.0, 0.0))],
+    )
+    module.graph.apply(past)
+    assert module.loaded() == []
+    return module
+
+
+def test_in_lockstep_a_restarted_module_answers_the_pose_that_it_finds_in_the_graph() -> None:
+    module = _joining(6 * PERIOD_NS, Phase.END)
+
+    assert module.feed(motion_of(6)) == []
+    offer, command = module.feed(scan_of(cycle=6))
+
+    assert isinstance(offer, Offer)
+    assert offer.cycle == 6
+    assert isinstance(command, MotorCommand)
+    assert command.stamp_ns == 6 * PERIOD_NS
+
+
+def test_in_lockstep_a_restarted_module_answers_the_pose_of_a_cycle_under_way() -> None:
+    module = _joining(5 * PERIOD_NS, Phase.PERCEPTS)
+
+    module.feed(motion_of(6))
+    (command,) = commands_in(module.feed(scan_of(cycle=6)))
+    assert command.stamp_ns == 5 * PERIOD_NS
+
+    (command,) = commands_in(module.feed(pose_delta(6)))
+    assert command.stamp_ns == 6 * PERIOD_NS
+
+
+def test_in_lockstep_a_pose_that_was_answered_is_not_answered_again_when_a_graph_is_loaded() -> (
+    None
+):
+    module, command = _answered_lockstep()
+    assert module.graph is not None
+    module.graph.change([agent(stamp_ns=command.stamp_ns)])
+
+    assert module.loaded() == []
+    assert module.feed(scan_of(cycle=2)) == []
 
 
 def test_in_lockstep_a_restarted_module_waits_for_no_past_competition() -> None:
