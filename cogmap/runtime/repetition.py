@@ -28,7 +28,7 @@ DOUBTED_VIEWS = 3
 """
 
 KEPT_WAITS = 16
-"""Of so many waits the usual one is the median."""
+"""Of so many waits the usual one is the median; before there were any, all are 0."""
 
 
 class Repetition:
@@ -45,7 +45,7 @@ class Repetition:
         self._since_ns = 0
         self._asked_ns = 0
         self._begins_anew = False
-        self._waits_ns: deque[int] = deque(maxlen=KEPT_WAITS)
+        self._waits_ns = deque([0] * KEPT_WAITS, KEPT_WAITS)
 
     def on_presence(self, presence: Presence) -> None:
         """Note who leaves, and who comes back."""
@@ -91,5 +91,5 @@ class Repetition:
     def _patience_ns(self) -> float:
         if not self._doubted:
             return REPEAT_AFTER_NS
-        usual_ns = median(self._waits_ns) if self._waits_ns else 0
+        usual_ns = median(self._waits_ns)
         return min(REPEAT_AFTER_NS, max(DOUBTED_AFTER_NS, TIMES_USUAL * usual_ns))

@@ -72,6 +72,7 @@ class LongTermMemory:
         self._stored_cycle = 0
         self._ended_ns: int | None = None
         self._scan_ns = NEVER_NS
+        self._offered: Offer | None = None
 
     def on_restored(self, restored: Restored) -> None:
         """Take up what the database holds."""
@@ -105,11 +106,16 @@ class LongTermMemory:
 
     def on_scan(self, scan: RangeScan) -> list[Message]:
         """Reply at once to a repeated scan. It shows that everything waits, as after a restart of
-        another module: then no broadcast will come.
+        another module: then no broadcast will come. In lockstep the next cycle may have lost the
+        last offer, which is made again without its operations.
         """
         is_repeated = scan.stamp_ns == self._scan_ns
         self._scan_ns = scan.stamp_ns
-        return self._replies(at_once=is_repeated)
+        replies = self._replies(at_once=is_repeated)
+        is_lost = is_repeated and self._is_lockstep and not replies
+        if is_lost and self._offered is not None:
+            return [self._offered]
+        return replies
 
     def on_delta(self, delta: Delta) -> list[Message]:
         """Note what changes; the end of a cycle is the time to store and to recall."""
@@ -180,6 +186,7 @@ class LongTermMemory:
         if not operations and not self._is_lockstep:
             return []
 
+        self._offered = Offer(stamp_ns=stamp_ns, cycle=cycle, operations=[])
         return [Offer(stamp_ns=stamp_ns, cycle=cycle, operations=operations)]
 
 

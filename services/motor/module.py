@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from cogmap.graph.graph import Graph
@@ -72,6 +72,7 @@ class MotorModule:
         self._answered: MotorCommand | None = None
         self._answered_cycle = 0
         self._sought: Goal | None = None
+        self._offered: Offer | None = None
 
     def restore(self, past: Iterable[Message]) -> None:
         """Resume the program that was executed last. A turn begins anew."""
@@ -110,8 +111,9 @@ class MotorModule:
     def on_scan(self, scan: RangeScan) -> list[Message]:
         """Measure how far it is free ahead.
 
-        In lockstep a repeated scan is answered at once: by the command for the pose that waits, or
-        by a halt if no pose has come since a restart.
+        In lockstep a repeated scan is answered at once: by the command for the pose that waits, by
+        a halt if no pose has come since a restart, or by the last offer, which the next cycle waits
+        for and may have lost.
         """
         self._clear_m = obstacle_ahead_m(scan)
         is_repeated = scan.stamp_ns == self._gate.scan_ns
@@ -125,7 +127,12 @@ class MotorModule:
         if is_repeated and self._is_lockstep and has_no_pose:
             command = self._remember(halted(scan.stamp_ns, SpeedLimit.NO_POSE))
             return [*self._offers(command), command]
-        return self._replies(at_once=is_repeated)
+
+        replies = self._replies(at_once=is_repeated)
+        is_lost = is_repeated and self._is_lockstep and not replies
+        if is_lost and self._offered is not None:
+            return [self._offered]
+        return replies
 
     def on_delta(self, delta: Delta) -> list[Message]:
         """Command the wheels for a new pose of the self node; repeat the command for a repeated
@@ -157,7 +164,8 @@ class MotorModule:
         """Take up the plan of a graph that was loaded as a whole.
 
         In lockstep its pose is answered too if none as new was: whoever loads it was restarted, or
-        has lost the delta of that pose, and nobody else will answer it.
+        has lost the delta of that pose, and nobody else will answer it. If one was, the next cycle
+        may still wait for an offer.
         """
         graph = self._graph
         plan = graph.get(Plan, PLAN_ID)
@@ -168,7 +176,7 @@ class MotorModule:
 
         answered = self._answered
         if answered is not None and agent.stamp_ns <= answered.stamp_ns:
-            return []
+            return [self._offer(answered.stamp_ns, graph.cycle)]
 
         cycle = graph.cycle - 1 if graph.phase in BEFORE_POSE else graph.cycle
         pose = Pose(x_m=agent.x_m, y_m=agent.y_m, heading_rad=agent.heading_rad)
@@ -228,8 +236,12 @@ class MotorModule:
 
         if not operations and not self._is_lockstep:
             return []
-        cycle = self._graph.cycle
-        return [Offer(stamp_ns=command.stamp_ns, cycle=cycle, operations=operations)]
+        return [self._offer(command.stamp_ns, self._graph.cycle, operations)]
+
+    def _offer(self, stamp_ns: int, cycle: int, operations: Sequence[Operation] = ()) -> Offer:
+        """Make an offer; it is repeated without its operations."""
+        self._offered = Offer(stamp_ns=stamp_ns, cycle=cycle, operations=[])
+        return Offer(stamp_ns=stamp_ns, cycle=cycle, operations=[*operations])
 
     def _command(self, at_once: bool = False) -> MotorCommand | None:
         """Make the command for the newest pose, if one is there and waits for nothing more."""

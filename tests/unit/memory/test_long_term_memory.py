@@ -312,7 +312,10 @@ def test_a_repeated_scan_releases_the_offer_that_waits_for_a_lost_competition() 
     scan = RangeScan(stamp_ns=2 * 10**9, frame=2, bearing_rad=rays, range_m=rays)
 
     assert mind.module.feed(scan) == []
-    assert len(of_type(Offer, mind.module.feed(scan))) == 1
+    (offer,) = of_type(Offer, mind.module.feed(scan))
+
+    assert offer.cycle == 2
+    assert [again.cycle for again in of_type(Offer, mind.module.feed(scan))] == [2]
 
 
 def test_in_lockstep_one_that_joins_in_a_cycle_waits_for_no_competition_before_it() -> None:

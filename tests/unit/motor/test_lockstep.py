@@ -222,8 +222,32 @@ def test_in_lockstep_a_pose_that_was_answered_is_not_answered_again_when_a_graph
     assert module.graph is not None
     module.graph.change([agent(stamp_ns=command.stamp_ns)])
 
-    assert module.loaded() == []
-    assert module.feed(scan_of(cycle=2)) == []
+    assert commands_in(module.loaded()) == []
+    assert commands_in(module.feed(scan_of(cycle=2))) == []
+
+
+def test_in_lockstep_one_that_halted_before_it_has_the_graph_offers_nothing_for_its_cycle() -> None:
+    module = module_without_plan(LOCKSTEP)
+    module.feed(scan_of(cycle=7))
+    (command,) = commands_in(module.feed(scan_of(cycle=7)))
+    assert command.halted_by is SpeedLimit.NO_POSE
+    assert module.graph is not None
+    past = Delta(stamp_ns=PERIOD_NS, version=1, cycle=5, phase=Phase.END, operations=[agent()])
+    module.graph.apply(past)
+
+    (offer,) = module.loaded()
+
+    assert isinstance(offer, Offer)
+    assert (offer.cycle, offer.operations) == (5, [])
+
+
+def test_in_lockstep_a_repeated_scan_that_needs_no_answer_repeats_the_offer() -> None:
+    module, command = _answered_lockstep()
+
+    (offer,) = module.feed(scan_of())
+
+    assert isinstance(offer, Offer)
+    assert (offer.stamp_ns, offer.operations) == (command.stamp_ns, [])
 
 
 def test_in_lockstep_a_restarted_module_waits_for_no_past_competition() -> None:
