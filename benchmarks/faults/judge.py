@@ -127,7 +127,7 @@ def _journaled(path: Path) -> tuple[dict[int, bytes], int]:
 def _said(attacked: Attacked) -> dict[str, int]:
     """Return how many messages of each topic are in no log, as the drive's summary states."""
     log = attacked.summary.get("log") or {}
-    said: dict[str, int] = log.get("unlogged", {})
+    said: dict[str, int] = log.get("lost", {})
     return said
 
 
