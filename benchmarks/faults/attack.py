@@ -20,14 +20,12 @@ from benchmarks.faults.parts import FORK_SERVER, ROUTER, all_at, is_idle, kill, 
 from benchmarks.faults.witness import Seen, Witness
 from cogmap.bus.session import free_endpoint, listens
 from cogmap.cli.launch.supervisor import MAX_QUICK_DEATHS, STEADY_S
+from cogmap.cli.launch.watchdog import STALLED_S
 from cogmap.cli.run.child import DriveProcess
 from cogmap.errors import CogmapError
 
 AGENT = "faults"
 BEGIN_S = 180.0
-STALLED_S = 20.0
-"""A kill after which no command comes for so long has stalled the drive."""
-
 SETTLED_COMMANDS = 5
 """So many commands after the killed one is back, all is as before."""
 
@@ -36,7 +34,8 @@ QUIET_S = 1.0
 QUIET_LIMIT_S = 30.0
 ORPHANS_S = 5.0
 LOOK_S = 0.05
-IDLE_LOOKS = 6
+LOOK_AT_ALL_S = 0.25
+IDLE_LOOKS = 3
 """So often in a row a fork server must be idle that it is not only reading a file."""
 
 TOWN_M = 120
@@ -171,6 +170,7 @@ class _Attacker:
         self._random = random
         self._deaths_s: dict[str, list[float]] = {}
         self._idle_looks = 0
+        self._look_at_s = 0.0
 
     def kill(self, part: str) -> Kill | None:
         """Kill a part at some time, and wait until the drive goes on as before; None where it has
@@ -222,7 +222,13 @@ class _Attacker:
         if part not in {ROUTER, FORK_SERVER}:
             return self._witness.present[part] > arrivals
 
+        # To look through all processes of a machine takes a while.
+        now_s = time.monotonic()
+        if now_s < self._look_at_s:
+            return False
+
         others = set(pids_of(self._endpoint, part)) - set(killed)
+        self._look_at_s = now_s + LOOK_AT_ALL_S
         if part == ROUTER:
             return bool(others)
         self._idle_looks = self._idle_looks + 1 if any(map(is_idle, others)) else 0

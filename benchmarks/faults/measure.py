@@ -12,12 +12,13 @@ import click
 import numpy as np
 
 from benchmarks.benchmark import Setting
-from benchmarks.faults.attack import STALLED_S, Attacked, Kill, attack
+from benchmarks.faults.attack import Attacked, Kill, attack
 from benchmarks.faults.cuts import recovered_share
 from benchmarks.faults.judge import Lost, judged
 from benchmarks.faults.parts import PARTS, key_of
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_least, at_most
+from cogmap.cli.launch.watchdog import STALLED_S
 from cogmap.cli.progress import bar
 from cogmap.errors import CogmapError
 from cogmap.parallel import Progress
@@ -95,7 +96,7 @@ def measure(
     included, while an agent explores a small town: in lockstep at the level of percepts, in real
     time with cameras. A drive is attacked 42 times at most; then time stands, its graphs are
     compared, it ends, and its logs, journal and database are read. `back_s` is the longest wait for
-    a motor command from a kill until five commands after the killed one is back; one of over 20 s
+    a motor command from a kill until five commands after the killed one is back; one of over 30 s
     has stalled the drive. Logs are cut at three random places each, and recovered. Takes about 20
     minutes; on a machine that is busy otherwise, times say nothing.
     """
