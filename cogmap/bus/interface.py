@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from cogmap.bus.codec import Envelope
 from cogmap.schemas.topics import Topic
 
-# How many messages of a NEVER_DROP topic a publisher keeps for subscribers that missed them.
-CACHED_MESSAGES = 1024
 Job = Callable[[], None]
 
 
@@ -30,6 +28,19 @@ class Answer:
 
     payload: bytes
     envelope: Envelope | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """A message that was published before: its bytes, and those of its envelope."""
+
+    payload: bytes
+    envelope: bytes
+
+
+# Returns messages of a topic with numbers from the first to the last given, in order: a piece of
+# them, or none.
+Past = Callable[[Topic, int, int], Sequence[Sent]]
 
 
 @dataclass(frozen=True, order=True)
@@ -80,6 +91,20 @@ class Bus(Protocol):
 
     def query(self, request: Topic, payload: bytes, timeout_s: float) -> Answer:
         """Send a query and wait for its answer. Raises NoAnswerError."""
+
+    def serve_past(self, topic: Topic, source: str, past: Past) -> None:
+        """Answer who asks for earlier messages of `topic` that `source` published.
+
+        `past` is called on a thread of the bus.
+        """
+
+    def fetch_past(
+        self, topic: Topic, source: str, first: int, last: int, timeout_s: float
+    ) -> list[Arrival]:
+        """Ask `source` for its messages of `topic` with numbers from `first` to `last`.
+
+        Returns a piece of them, in order; none if there are none, or nobody answers.
+        """
 
     def announce(self, member: Member) -> None:
         """Let everybody know that `member` is ready, until this bus closes or its process dies."""

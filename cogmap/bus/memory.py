@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cogmap.bus.codec import Envelope
-from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
+from cogmap.bus.codec import Envelope, decode_envelope
+from cogmap.bus.depth import cached_messages
+from cogmap.bus.interface import Answer, Arrival, Job, Member, Past
 from cogmap.errors import NoAnswerError
 from cogmap.schemas.topics import Delivery, Topic
 
@@ -32,6 +34,7 @@ class MemoryNetwork:
     def __init__(self) -> None:
         self.subscribers: dict[Topic, list[Subscription]] = {}
         self.servers: dict[Topic, Handler] = {}
+        self.pasts: dict[tuple[Topic, str], Past] = {}
         self.members: dict[Member, MemoryBus] = {}
         self.buses: list[MemoryBus] = []
         self.watchers: list[Watcher] = []
@@ -68,11 +71,12 @@ class MemoryBus:
         self._network = network
         self._subscriptions: list[Subscription] = []
         self._served: list[Topic] = []
+        self._past_of: list[tuple[Topic, str]] = []
         network.buses.append(self)
 
     def declare(self, topic: Topic) -> None:
         if topic.delivery is Delivery.NEVER_DROP:
-            self.cache.setdefault(topic, deque(maxlen=CACHED_MESSAGES))
+            self.cache.setdefault(topic, deque(maxlen=cached_messages(topic)))
 
     def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
         arrival = Arrival(topic, payload, envelope, envelope.sent_ns)
@@ -115,6 +119,22 @@ class MemoryBus:
         except Exception as error:
             raise NoAnswerError(f"{request.name}: {error}") from error
 
+    def serve_past(self, topic: Topic, source: str, past: Past) -> None:
+        self._network.pasts[topic, source] = past
+        self._past_of.append((topic, source))
+
+    def fetch_past(
+        self, topic: Topic, source: str, first: int, last: int, timeout_s: float
+    ) -> list[Arrival]:
+        past = self._network.pasts.get((topic, source))
+        if past is None:
+            return []
+        now_ns = time.time_ns()
+        sent = past(topic, first, last)
+        return [
+            Arrival(topic, each.payload, decode_envelope(each.envelope), now_ns) for each in sent
+        ]
+
     def announce(self, member: Member) -> None:
         self._network.enter(member, self)
 
@@ -129,4 +149,6 @@ class MemoryBus:
             self._network.subscribers[subscription.topic].remove(subscription)
         while self._served:
             self._network.servers.pop(self._served.pop(), None)
+        while self._past_of:
+            self._network.pasts.pop(self._past_of.pop(), None)
         self._network.leave(self)

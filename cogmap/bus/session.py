@@ -23,6 +23,7 @@ from cogmap.errors import AccessError, NoRouterError, PortInUseError, UsageError
 if TYPE_CHECKING:
     from cogmap.bus.access.keys import Keys
     from cogmap.bus.interface import Member
+    from cogmap.schemas.topics import Topic
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_AGENT = "agent"
@@ -51,10 +52,20 @@ _NAME = re.compile(r"[\w.-]+")
 
 def check_name(option: str, name: str) -> None:
     """Raise UsageError if `name`, given by `option`, cannot be part of a key expression."""
-    if not _NAME.fullmatch(name):
+    if not is_name(name):
         raise UsageError(
             f"{option} {name!r}: use letters, digits, '.', '-' and '_' only, such as robot-1"
         )
+
+
+def is_name(name: str) -> bool:
+    """Return whether `name` can be part of a key expression."""
+    return _NAME.fullmatch(name) is not None
+
+
+def past_key(agent: str, topic: Topic, source: str) -> str:
+    """Return the key at which `source` answers for what it published on `topic`."""
+    return f"{topic.key(agent)}/@past/{source}"
 
 
 def ready_key(agent: str, member: Member) -> str:

@@ -13,9 +13,10 @@ from zenoh import ext
 
 from cogmap.bus.access.subjects import SUBJECTS
 from cogmap.bus.codec import Envelope, decode_envelope, encode
+from cogmap.bus.depth import cached_messages
 from cogmap.bus.discovery import Role, announce_use, identify
-from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Job, Member
-from cogmap.bus.session import check_name, open_client, ready_key
+from cogmap.bus.interface import Answer, Arrival, Job, Member, Past
+from cogmap.bus.session import check_name, is_name, open_client, past_key, ready_key
 from cogmap.errors import MessageError, NoAnswerError
 from cogmap.schemas.topics import Delivery, Scope, Topic
 
@@ -102,7 +103,7 @@ class ZenohBus:
             key,
             encoding=encoding(topic),
             congestion_control=zenoh.CongestionControl.DROP,
-            cache=ext.CacheConfig(max_samples=CACHED_MESSAGES),
+            cache=ext.CacheConfig(max_samples=cached_messages(topic)),
             sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=None),
             publisher_detection=True,
             priority=_priority(topic),
@@ -191,6 +192,45 @@ class ZenohBus:
             f"nobody answers {request.name} within {timeout_s:g} s: "
             f"is the module that does running?"
         )
+
+    def serve_past(self, topic: Topic, source: str, past: Past) -> None:
+        def respond(query: zenoh.Query) -> None:
+            with query:
+                try:
+                    first = int(query.parameters.get("first") or "")
+                    last = int(query.parameters.get("last") or "")
+                except ValueError:
+                    query.reply_err(b"which messages? Add first=NUMBER;last=NUMBER")
+                    return
+                for sent in past(topic, first, last):
+                    query.reply(
+                        query.key_expr,
+                        sent.payload,
+                        encoding=encoding(topic),
+                        attachment=sent.envelope,
+                    )
+
+        key = past_key(self._agent, topic, source)
+        self._declared.append(self._session.declare_queryable(key, respond))
+
+    def fetch_past(
+        self, topic: Topic, source: str, first: int, last: int, timeout_s: float
+    ) -> list[Arrival]:
+        if not is_name(source):
+            return []
+        replies = self._session.get(
+            f"{past_key(self._agent, topic, source)}?first={first};last={last}",
+            priority=ANSWER_PRIORITY,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=timeout_s,
+        )
+        found = []
+        for reply in replies:
+            if reply.ok is not None:
+                now_ns = time.time_ns()
+                payload = bytes(reply.ok.payload)
+                found.append(Arrival(topic, payload, _envelope(reply.ok), now_ns))
+        return found
 
     def announce(self, member: Member) -> None:
         self.identify(member)

@@ -19,6 +19,7 @@ from cogmap.runtime.heap import keep_freed_memory
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from cogmap.runtime.state.journal import Journal
+from cogmap.runtime.state.outbox import Outbox
 from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.state.store import Store
 
@@ -112,7 +113,9 @@ def run_module(
         give_way()
     journal = None
     counts = None
+    outbox = None
     if state is not None:
+        outbox = Outbox(state / f"{module.instance}.outbox")
         counts = PublishedCounts(state / f"{module.instance}.published")
         if module.journal is not None:
             journal = Journal(state / f"{module.instance}.journal")
@@ -124,7 +127,7 @@ def run_module(
         keys=environment.keys(module.name),
     )
     stop = Stop(tied)  # only now: until a router answers, a signal ends the process at once
-    shell = Shell(module, bus, journal, counts=counts, store=store)
+    shell = Shell(module, bus, journal, counts=counts, store=store, outbox=outbox)
     try:
         shell.open()
         log.info("%s is ready", module.instance)

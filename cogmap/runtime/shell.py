@@ -8,17 +8,20 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from cogmap.bus.codec import Cause, decode, encode
-from cogmap.bus.interface import CACHED_MESSAGES, Answer, Arrival, Bus, Member
+from cogmap.bus.depth import cached_messages
+from cogmap.bus.interface import Answer, Arrival, Bus, Member
 from cogmap.errors import MessageError
 from cogmap.graph.replica import Fetched
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.delivery.publisher import Computation, Publisher
+from cogmap.runtime.delivery.recovery import Recovery
 from cogmap.runtime.follower import Follower
 from cogmap.runtime.health import Meter
 from cogmap.runtime.module import Module, Reply
 from cogmap.runtime.roster import Roster
 from cogmap.runtime.state.journal import Journal
+from cogmap.runtime.state.outbox import Outbox
 from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.state.store import Store
 from cogmap.runtime.timers import Due, Timers
@@ -39,8 +42,9 @@ OUTSIDE = "@outside"
 class Shell:
     """Runs `module` on `bus`: `open()` it, then `spin_once()` from one thread; `close()` ends it.
 
-    `journal` and `counts` keep on disk what a restart must not lose, and `store` what the next run
-    is to know. With `health` it publishes its health once a second.
+    `journal` and `counts` keep on disk what a restart must not lose, `outbox` what others may have
+    missed, and `store` what the next run is to know. With `health` it publishes its health once a
+    second.
     """
 
     def __init__(
@@ -52,13 +56,15 @@ class Shell:
         counts: PublishedCounts | None = None,
         *,
         store: Store | None = None,
+        outbox: Outbox | None = None,
     ) -> None:
         self.module = module
         self.bus = bus
         self.inbox = Inbox()
         self.intake = Intake()
         self.meter = Meter(module)
-        self.publisher = Publisher(module, bus, journal, counts, store)
+        self.publisher = Publisher(module, bus, journal, counts, store, outbox=outbox)
+        self._recovery = Recovery(bus, self.intake)
         self._journal = journal
         self._store = store
         self._counts = counts
@@ -92,8 +98,8 @@ class Shell:
         self.publisher.declare(self._health)
         for topic in self.module.handlers:
             if topic is not topics.PRESENCE:
-                history = CACHED_MESSAGES if topic in backfill else 0
-                self.bus.subscribe(topic, self.inbox.put, self.intake.count_lost, history)
+                history = cached_messages(topic) if topic in backfill else 0
+                self.bus.subscribe(topic, self.inbox.put, _leave_to_numbers, history)
         for request, (reply, handler) in self.module.served.items():
             answer = self._server(request, handler)
             self.bus.serve(request, reply, answer, self.inbox.call)
@@ -122,6 +128,8 @@ class Shell:
             return False
 
         if isinstance(item, Arrival):
+            for missed in self._recovery.before(item):
+                self._receive(missed)
             self._receive(item)
         else:
             item()
@@ -146,6 +154,7 @@ class Shell:
         self.bus.close()
         if self._journal is not None:
             self._journal.close()
+        self.publisher.close()
         if self._counts is not None:
             self._counts.close()
         if self._store is not None:
@@ -294,3 +303,9 @@ class Shell:
             self.intake, self.inbox, self.publisher, self._started, self.notes
         )
         self.publisher.send_health(health)
+
+
+def _leave_to_numbers(topic: str, number: int) -> None:
+    """Do nothing for messages that the bus gave up: they are fetched once the next one shows by its
+    number which, and counted if that fails.
+    """

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from cogmap.bus.interface import CACHED_MESSAGES, Bus
+from cogmap.bus.depth import cached_messages
+from cogmap.bus.interface import Bus
 from cogmap.bus.session import free_endpoint
 from cogmap.graph.graph import Graph
 from cogmap.runtime.module import Module
@@ -128,7 +129,7 @@ def test_a_loss_beyond_the_cache_is_counted_and_a_snapshot_mends_the_graph(
         spin_until(lambda: replica.version == 1, follower)
 
         router.kill()
-        keeper.commit(CACHED_MESSAGES + lost)
+        keeper.commit(cached_messages(topics.DELTA) + lost)
         router.start()
         spin_until(lambda: replica.version == keeper.graph.version, follower)
 

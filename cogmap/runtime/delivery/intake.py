@@ -18,12 +18,29 @@ LOG_INTERVAL_S = 1.0
 _MAX_SENTENCE = 500
 
 
+def number_of(envelope: Envelope | None) -> int | None:
+    """Return a message's number among all of its source on its topic, of every incarnation; None if
+    the source does not count them.
+    """
+    if envelope is None or envelope.earlier == UNKNOWN:
+        return None
+    return envelope.earlier + envelope.seq
+
+
 @dataclass
 class _Stream:
     """The last message of one source on one topic, and the incarnations before its own."""
 
     last: Envelope
     ended: set[int] = field(default_factory=set)
+
+    def before(self, envelope: Envelope) -> range:
+        """Return the numbers between the last message and `envelope`, none if they are unknown."""
+        last = number_of(self.last)
+        number = number_of(envelope)
+        if last is None or number is None or envelope.incarnation in self.ended:
+            return range(0)
+        return range(last + 1, number)
 
     def advance(self, envelope: Envelope) -> int:
         """Make `envelope` the last one. Returns how many messages are missing before it.
@@ -40,10 +57,8 @@ class _Stream:
             missing = envelope.seq - last.seq - 1
         else:
             self.ended.add(last.incarnation)
-            missing = 0
-            if UNKNOWN not in (last.earlier, envelope.earlier):
-                received = last.earlier + last.seq + 1
-                missing = max(0, envelope.earlier + envelope.seq - received)
+            awaited = self.before(envelope)
+            missing = max(0, awaited.stop - awaited.start)
 
         self.last = envelope
         return missing
@@ -81,8 +96,22 @@ class Intake:
         self.received[topic.name] += 1
         return message
 
+    def missing_before(self, topic: Topic, envelope: Envelope) -> range:
+        """Return the numbers of the messages that have not come before that of `envelope`, of all
+        that its source published on `topic`; none if it does not count them.
+        """
+        stream = self._streams.get((topic, envelope.source))
+        return range(0) if stream is None else stream.before(envelope)
+
+    def resume(self, topic: Topic, envelope: Envelope) -> None:
+        """Go on from a message of `topic` that was received before this process was started."""
+        self._streams[topic, envelope.source] = _Stream(envelope)
+
     def count_lost(self, topic: str, number: int) -> None:
-        """Count messages of `topic` that the bus gave up; called from its threads."""
+        """Count messages of `topic` that the bus gave up; called from its threads.
+
+        Not for who fetches them: the numbers show what is lost for good.
+        """
         self._given_up[topic] += number
         self._count_gaps(topic)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import Counter
 from dataclasses import dataclass
@@ -10,8 +11,11 @@ from msgspec.structs import replace
 
 from cogmap.bus.codec import UNKNOWN, Cause, Envelope, encode
 from cogmap.bus.interface import Bus
+from cogmap.errors import StorageError
+from cogmap.runtime.delivery.intake import number_of
 from cogmap.runtime.module import Module
 from cogmap.runtime.state.journal import Journal
+from cogmap.runtime.state.outbox import Outbox
 from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.state.store import Store
 from cogmap.schemas import topics
@@ -20,6 +24,7 @@ from cogmap.schemas.memory import Stored
 from cogmap.schemas.process import Health
 from cogmap.schemas.topics import Delivery, Topic
 
+log = logging.getLogger("cogmap")
 # If more wait for an output, health takes them: so they stay few in a module that is silent.
 MAX_CAUSES = 1000
 # Stamps whose traces are kept, the newest.
@@ -43,7 +48,7 @@ class Computation:
 
 
 class Publisher:
-    """Sends messages of `module` on `bus`, to the journal or the store first; `emitted` counts them
+    """Sends messages of `module` on `bus`, to the files that keep them first; `emitted` counts them
     by topic.
     """
 
@@ -54,6 +59,8 @@ class Publisher:
         journal: Journal | None = None,
         counts: PublishedCounts | None = None,
         store: Store | None = None,
+        *,
+        outbox: Outbox | None = None,
     ) -> None:
         self.incarnation = time.time_ns()
         self.emitted: Counter[str] = Counter()
@@ -62,14 +69,19 @@ class Publisher:
         self._journal = journal
         self._counts = counts
         self._store = store
+        self._outbox = outbox
+        self._keeps = outbox is not None
         self._causes: list[Cause] = []
         self._traces: dict[int, Envelope] = {}
 
     def declare(self, health: bool) -> None:
         """Prepare to publish all that the module may, and its health."""
         for topic in topics.ALL:
-            if topic in self._module.emits:
-                self._bus.declare(topic)
+            if topic not in self._module.emits:
+                continue
+            self._bus.declare(topic)
+            if self._outbox is not None and topic.delivery is Delivery.NEVER_DROP:
+                self._bus.serve_past(topic, self._module.instance, self._outbox.read)
         if health:
             self._bus.declare(topics.HEALTH)
 
@@ -102,8 +114,25 @@ class Publisher:
         if trace is not None and computation.answers and not topic.sensed:
             envelope.continue_trace(trace, self._module.name, computation.compute_ns)
 
+        self._keep(topic, envelope, payload)
         self._bus.publish(topic, payload, envelope)
         self.emitted[topic.name] += 1
+
+    def _keep(self, topic: Topic, envelope: Envelope, payload: bytes) -> None:
+        """Keep a message for those who will have missed it. A full disk ends that, and no more."""
+        number = number_of(envelope)
+        if self._outbox is None or number is None or not self._keeps:
+            return
+        try:
+            self._outbox.append(topic, number, encode(envelope), payload)
+        except StorageError as error:
+            log.warning("%s; messages that others miss are lost from now on", error)
+            self._keeps = False
+
+    def close(self) -> None:
+        """Close the file of what was published."""
+        if self._outbox is not None:
+            self._outbox.close()
 
     def compact_journal(self) -> None:
         """Shorten a journal that has become long. Never call it between the messages of one reply:

@@ -1,0 +1,46 @@
+"""Fetches the messages that the bus could not deliver from those who published them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from cogmap.bus.interface import Arrival, Bus
+from cogmap.runtime.delivery.intake import Intake, number_of
+from cogmap.schemas.topics import Topic
+
+# How long a piece may take: a slow link carries one in a few seconds.
+TIMEOUT_S = 10.0
+
+
+class Recovery:
+    """Fetches what `intake` is missing over `bus`."""
+
+    def __init__(self, bus: Bus, intake: Intake) -> None:
+        self._bus = bus
+        self._intake = intake
+
+    def before(self, arrival: Arrival) -> Iterator[Arrival]:
+        """Yield the messages that are missing before `arrival`, in order, as far as its source has
+        kept them. Each is to be accepted before the next is asked for.
+        """
+        envelope = arrival.envelope
+        if envelope is None:
+            return
+        missing = self._intake.missing_before(arrival.topic, envelope)
+        if missing:
+            yield from self.fetch(arrival.topic, envelope.source, missing.start, missing.stop - 1)
+
+    def fetch(self, topic: Topic, source: str, first: int, last: int) -> Iterator[Arrival]:
+        """Yield the messages of `source` with numbers from `first` to `last`, piece by piece."""
+        while first <= last:
+            asked = first
+            for arrival in self._bus.fetch_past(topic, source, first, last, TIMEOUT_S):
+                number = number_of(arrival.envelope)
+                is_next = number is not None and first <= number <= last
+                if not is_next:
+                    continue
+                assert number is not None
+                first = number + 1
+                yield arrival
+            if first == asked:
+                return
