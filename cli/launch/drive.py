@@ -32,9 +32,11 @@ from cogmap.cli.launch.watch import Watch
 from cogmap.cli.launch.watchdog import MAX_SHARE_SLOWED, REMEDY, Situation, Watchdog
 from cogmap.cli.options import DASHBOARD_PORT
 from cogmap.errors import ProcessFailedError
+from cogmap.recording.completeness import Published
 from cogmap.runtime import environment
 from cogmap.runtime.config import Sections
 from cogmap.runtime.process import Stop
+from cogmap.runtime.state.published import published_in
 from cogmap.schemas.sensing import SpeedLimit
 from cogmap.services import registry
 
@@ -74,6 +76,7 @@ class Drive:
         self._dashboard_port: int | None = None
         self._has_shown_dashboard = False
         self._paused_s = 0.0
+        self.published: Published = {}
         self.guide: Guide | None = None
         if self.choices.tour:
             self.guide = Guide(self.choices.explores_s, self.choices.goals)
@@ -269,6 +272,7 @@ class Drive:
             watch.close()
         supervisor.end([RECORDER], GRACE_S)
         supervisor.end([ROUTER], GRACE_S)
+        self.published = published_in(self.folder / STATE_NAME)
         if not self.choices.without:  # modules of others may still write there
             shutil.rmtree(self.folder / STATE_NAME, ignore_errors=True)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -16,9 +17,11 @@ from cogmap.cli.launch.individuals.judge import (
     judge,
 )
 from cogmap.cli.launch.tally import EnergyMetrics, Tally
+from cogmap.cli.progress import bar
 from cogmap.errors import LogError
 from cogmap.geometry.arrays import Floats
 from cogmap.graph.graph import Graph
+from cogmap.recording.completeness import Completeness, Published, completeness, never_drop
 from cogmap.recording.recorder import Summary
 from cogmap.recording.storage.format import SUMMARY
 from cogmap.recording.storage.reader import LogReader
@@ -52,30 +55,68 @@ class ErrorMetrics(msgspec.Struct, kw_only=True):
 
 
 class Recording(msgspec.Struct, kw_only=True):
-    """How the recording went. `gaps` are sentences; `never_drop_whole` is whether no message of any
-    NEVER_DROP topic is missing.
+    """How the recording went, in one log or, where the recorder was killed, in several. `gaps` are
+    sentences; `lost` are the NEVER_DROP messages that no log holds, by topic; `never_drop_whole` is
+    whether there are none. Of a log that was not finished, `messages` are those of NEVER_DROP
+    topics.
     """
 
     messages: int
     size_mb: float
     never_drop_whole: bool
     gaps: list[str]
+    lost: dict[str, int] = {}
+    logs: int = 1
 
     @classmethod
     def read(cls, path: Path) -> Recording | None:
         """Read it from the log at `path`; None if that was not finished, or cannot be read."""
-        try:
-            about = LogReader(path).about(SUMMARY)
-            summary = msgspec.json.decode(about.get("json", ""), type=Summary)
-        except (LogError, msgspec.DecodeError):
+        summary = _summary_in(path)
+        if summary is None:
             return None
 
+        found = Completeness(never_drop(summary.lost), summary.gaps)
+        return cls.of([path], sum(summary.messages.values()), found)
+
+    @classmethod
+    def of_run(cls, paths: Sequence[Path], published: Published) -> Recording | None:
+        """Read it from the logs of a run in which so much was `published`; None if there is none.
+
+        The summary of one that was finished is enough; others are read.
+        """
+        summary = _summary_in(paths[0]) if len(paths) == 1 else None
+        if summary is not None:
+            found = Completeness(never_drop(summary.lost), list(summary.gaps))
+            found.compare(summary.reached, published)
+            return cls.of(paths, sum(summary.messages.values()), found)
+        if not paths:
+            return None
+
+        with bar("reading what the logs lack") as progress:
+            found = completeness(paths, published, progress)
+        return cls.of(paths, found.messages, found)
+
+    @classmethod
+    def of(cls, paths: Sequence[Path], messages: int, found: Completeness) -> Recording:
+        """Make it of what was found in the logs."""
+        size_bytes = sum(path.stat().st_size for path in paths)
         return cls(
-            messages=sum(summary.messages.values()),
-            size_mb=path.stat().st_size / 1e6,
-            never_drop_whole=summary.never_drop_whole,
-            gaps=summary.gaps,
+            messages=messages,
+            size_mb=size_bytes / 1e6,
+            never_drop_whole=not found.lost,
+            gaps=found.gaps,
+            lost=found.lost,
+            logs=len(paths),
         )
+
+
+def _summary_in(path: Path) -> Summary | None:
+    """Return the recorder's summary in a log; None if it was not finished, or cannot be read."""
+    try:
+        about = LogReader(path).about(SUMMARY)
+        return msgspec.json.decode(about.get("json", ""), type=Summary)
+    except (LogError, msgspec.DecodeError):
+        return None
 
 
 class DriveMetrics(msgspec.Struct, kw_only=True):

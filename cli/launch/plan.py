@@ -244,9 +244,13 @@ def programs(folder: Path, endpoint: str, agent: str, choices: Choices) -> list[
     options = ["--tied", "--connect", endpoint, "--agent", agent, "--config", config_path]
 
     def record(starts: int) -> list[str]:
-        """Return a recorder's command. One that died leaves its log; the next writes another."""
-        name = LOG_NAME if starts == 0 else f"log-{starts + 1}.mcap"
-        return cogmap_command("log", "record", *options, "-o", str(folder / name))
+        """Return a recorder's command. One that died leaves its log; the next continues it in
+        another.
+        """
+        names = [LOG_NAME, *(f"log-{number}.mcap" for number in range(2, starts + 2))]
+        *earlier, path = (str(folder / name) for name in names)
+        continued = [word for log in earlier for word in ("--after", log)]
+        return cogmap_command("log", "record", *options, "-o", path, *continued)
 
     if choices.record:
         found.append(Program(RECORDER, record))

@@ -40,6 +40,7 @@ Examples:
   cogmap log record odometry motor/command   two topics
   cogmap log record -e '^workspace/'         what the workspace publishes
   cogmap log record -o drive.mcap --split-s 600    drive.mcap, drive-2.mcap ...
+  cogmap log record -o log-2.mcap --after log.mcap    and what log.mcap lacks, having been killed
   cogmap log record -o fall.mcap --snapshot-s 30   the last half minute, whenever s is pressed
 """
 
@@ -81,6 +82,14 @@ Examples:
     "whenever s is pressed, or by `kill -USR1`.",
 )
 @click.option("--start-paused", is_flag=True, help="Begin paused; the space bar continues.")
+@click.option(
+    "--after",
+    type=click.Path(dir_okay=False, path_type=Path),
+    multiple=True,
+    metavar="LOG",
+    help="Continue the log of an earlier recorder of this run, which was killed: fetch what it "
+    "lacks where its source still has it, and count the rest; may be repeated, oldest first.",
+)
 @compression_option
 @click.option(
     "--instance",
@@ -105,6 +114,7 @@ def record(
     split_mb: float | None,
     snapshot_s: float | None,
     start_paused: bool,
+    after: tuple[Path, ...],
     compression: str,
     instance: str,
     tied: bool,
@@ -152,6 +162,7 @@ def record(
                     max_bytes=1e6 * (split_mb or math.inf),
                 ),
                 snapshot_s=snapshot_s,
+                after=after,
             )
             if tied:
                 give_way()

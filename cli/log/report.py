@@ -41,6 +41,9 @@ def print_summary(summary: Summary) -> None:
     for sentence in summary.gaps:
         click.echo(f"gap: {sentence}")
 
+    fetched = sum(summary.fetched.values())
+    if fetched:
+        click.echo(f"{fetched} messages that the bus did not deliver, from who had published them.")
     left_out = sum(summary.left_out.values())
     if left_out:
         click.echo(f"{left_out} messages left out: it was paused, or no snapshot went back so far.")

@@ -26,7 +26,7 @@ from cogmap.cli.launch.outcome import Ending, Outcome
 from cogmap.cli.launch.watch import Watch
 from cogmap.cli.launch.watchdog import MAX_SHARE_SLOWED, REMEDY
 from cogmap.cli.run.folder import SUMMARY_NAME
-from cogmap.recording.storage.format import LOG_NAME
+from cogmap.recording.completeness import logs_of
 from cogmap.schemas.sensing import SpeedLimit
 from cogmap.services.codelets.rules import rules_of
 from cogmap.services.motor.config import Config as MotorConfig
@@ -38,7 +38,9 @@ NAMED = 8
 def finish(drive: Drive, watch: Watch, ending: Ending) -> RunMetrics:
     """Write the summary and the map of a drive that has ended so."""
     of_drive = drive_metrics(watch.tally, watch.gaps(), watch.rejected())
-    log = Recording.read(drive.folder / LOG_NAME) if drive.choices.record else None
+    log = None
+    if drive.choices.record:
+        log = Recording.of_run(logs_of(drive.folder), drive.published)
     rules = rules_of(drive.sections)
     metrics = RunMetrics(
         **msgspec.structs.asdict(of_drive),
@@ -186,7 +188,8 @@ def _loss_rows(metrics: RecordedMetrics, without_log: str) -> list[tuple[str, st
     if log is not None:
         gaps = "no gap in any NEVER_DROP topic" if log.never_drop_whole else "; ".join(log.gaps)
         recorded = f"{log.messages} messages, {log.size_mb:.0f} MB"
-        lost = f"{metrics.gaps_total}; in the log, {recorded}: {gaps}"
+        logs = "in the log" if log.logs == 1 else f"in the {log.logs} logs"
+        lost = f"{metrics.gaps_total}; {logs}, {recorded}: {gaps}"
 
     dropped = "none"
     if metrics.refused:

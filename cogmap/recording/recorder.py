@@ -15,29 +15,37 @@ from mcap.writer import CompressionType
 
 from cogmap.bus.interface import Arrival, Bus, Member
 from cogmap.errors import LogError
+from cogmap.recording.completeness import began_ns, sequence_of
 from cogmap.recording.storage import format as layout
 from cogmap.recording.storage.recent import Recent
 from cogmap.recording.storage.sequences import SequenceTracker
 from cogmap.recording.storage.write_queue import LIMIT_BYTES, WriteQueue
 from cogmap.recording.storage.writer import FlushTimer, LogWriter, check_new
-from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.delivery.intake import Intake, number_of
+from cogmap.runtime.delivery.recovery import Recovery
 from cogmap.schemas.topics import BY_NAME, Delivery, Topic
 
 log = logging.getLogger("cogmap")
 MODULE = "recorder"
 # How often it looks whether it is to stop.
 IDLE_S = 0.25
+# The most time that fetching may take when it ends, and the greatest number of a message.
+LAST_FETCH_S = 5.0
+LAST_NUMBER = 2**63 - 1
 
 
 class Summary(msgspec.Struct, kw_only=True):
     """How a recording went. Counts are of messages, by topic.
 
-    `lost`: missing by the sources' numbers; `unrecovered`: given up by the bus; `dropped`: found no
-    room here; `rejected`: were no messages of their topic. `gaps` are sentences;
-    `never_drop_whole`: no NEVER_DROP topic misses any. `queue_peak_mb` is the most that ever waited
-    to be written. `left_out` were received and not written: while it was paused, or earlier than a
-    snapshot goes back. `paths` are the files, more than one if the recording was split and one for
-    each snapshot: each file has the summary of all that was recorded until its end.
+    `lost`: missing by the sources' numbers, in the logs that it continues too; `unrecovered`: given
+    up by the bus, and not to be had from their sources; `dropped`: found no room here; `rejected`:
+    were no messages of their topic. `gaps` are sentences; `never_drop_whole`: no NEVER_DROP topic
+    misses any. `queue_peak_mb` is the most that ever waited to be written. `left_out` were received
+    and not written: while it was paused, or earlier than a snapshot goes back. `paths` are the
+    files, more than one if the recording was split and one for each snapshot: each file has the
+    summary of all that was recorded until its end. `reached` has by topic and source how many
+    messages the source had published with the last one recorded; `fetched` are those that the bus
+    did not deliver, from who had published them.
     """
 
     path: str
@@ -53,6 +61,8 @@ class Summary(msgspec.Struct, kw_only=True):
     queue_peak_mb: float = 0.0
     left_out: dict[str, int] = {}
     paths: list[str] = []
+    reached: dict[str, dict[str, int]] = {}
+    fetched: dict[str, int] = {}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +84,9 @@ class Recorder:
     `limit_bytes` may wait to be written. Where the recording is `split`, files follow whose names
     have a number, such as `drive-2.mcap`. With `snapshot_s` nothing is written but what a
     `snapshot()` finds: the messages of the last `snapshot_s`, at most `limit_bytes` of them, in a
-    file of its own. Raises LogError if the file cannot be written.
+    file of its own. It continues the logs `after`, of earlier recorders of the run: it fetches what
+    these lack from the sources, and counts what these do not have. Raises LogError if the file
+    cannot be written.
     """
 
     def __init__(
@@ -89,6 +101,7 @@ class Recorder:
         compression: CompressionType = CompressionType.LZ4,
         split: Split = WHOLE,
         snapshot_s: float | None = None,
+        after: Sequence[Path] = (),
     ) -> None:
         self._bus = bus
         self._topics = topics
@@ -108,9 +121,15 @@ class Recorder:
             self._recent = Recent(snapshot_s, limit_bytes)
         self.is_paused = False
         self._queue = WriteQueue(limit_bytes)
-        self._intake = Intake()
+        now_ns = time.time_ns()
+        continues_ns = began_ns(after, now_ns)
+        self._intake = Intake(continues_ns if after else None)
+        self._recovery = Recovery(bus, self._intake)
+        self._after = after
+        self._fetched: Counter[str] = Counter()
+        self._fetched_to: dict[tuple[Topic, str], int] = {}
         self._flush_timer = FlushTimer()
-        self._sequences = SequenceTracker(since_ns=time.time_ns())
+        self._sequences = SequenceTracker(now_ns, continues_ns)
         self._unrecovered: Counter[str] = Counter()
         self._written: Counter[str] = Counter()
         self._left_out: Counter[str] = Counter()
@@ -132,7 +151,14 @@ class Recorder:
         return self._written
 
     def open(self) -> None:
-        """Join the bus and announce itself: all that is published from now on is recorded."""
+        """Join the bus and announce itself: all that is published from now on is recorded, and what
+        the logs that it continues lack of what was published before.
+        """
+        for topic, envelope in sequence_of(self._after):
+            self._sequences.follow(topic, envelope)
+            self._intake.resume(topic, envelope)
+        if self._after:
+            self._queue.call(lambda: self._fetch_rest(math.inf))
         for topic in self._topics:
             self._bus.subscribe(topic, self._queue.put, self.on_gap)
         self._bus.watch(self.on_member)
@@ -176,7 +202,13 @@ class Recorder:
         return writer.path
 
     def close(self) -> Summary:
-        """Leave the bus, write what waits, and finish the file. Raises LogError."""
+        """Write what waits and what the bus has not delivered yet, leave the bus, and finish the
+        file. Raises LogError.
+        """
+        end_s = time.monotonic() + LAST_FETCH_S
+        while time.monotonic() < end_s and self._take(0.0):
+            pass
+        self._fetch_rest(end_s)
         self._bus.close()
         while self._take(0.0):
             pass
@@ -206,7 +238,9 @@ class Recorder:
     def _summary(self) -> Summary:
         lost = self._sequences.lost()
         dropped = dict(self._queue.dropped)
-        incomplete = {*lost, *dropped, *self._unrecovered}
+        given_up = {name: min(n, lost.get(name, 0)) for name, n in self._unrecovered.items()}
+        unrecovered = {name: number for name, number in given_up.items() if number}
+        incomplete = {*lost, *dropped, *unrecovered}
         never_drop = [name for name in incomplete if BY_NAME[name].delivery is Delivery.NEVER_DROP]
         return Summary(
             path=str(self.path),
@@ -214,7 +248,7 @@ class Recorder:
             size_bytes=self._size_bytes,
             messages=dict(self._written),
             lost=lost,
-            unrecovered=dict(self._unrecovered),
+            unrecovered=unrecovered,
             dropped=dropped,
             rejected=dict(self._intake.rejected),
             gaps=self._sequences.gaps(),
@@ -222,6 +256,8 @@ class Recorder:
             queue_peak_mb=self._queue.peak_bytes / 1e6,
             left_out=dict(self._left_out),
             paths=[str(path) for path in self._paths],
+            reached=self._sequences.reached(),
+            fetched=dict(self._fetched),
         )
 
     def abandon(self) -> None:
@@ -259,11 +295,45 @@ class Recorder:
             item()
             return True
 
-        message = self._intake.accept(item)
-        if message is not None and item.envelope is not None:
-            self._sequences.follow(item.topic, item.envelope)
-            self._store(item)
+        if self._was_fetched(item):
+            return True
+        for missed in self._recovery.before(item):
+            self._accept_fetched(missed)
+        self._accept(item)
         return True
+
+    def _accept(self, arrival: Arrival) -> bool:
+        """Record a message, if it is one. Returns whether it is."""
+        message = self._intake.accept(arrival)
+        if message is None or arrival.envelope is None:
+            return False
+        self._sequences.follow(arrival.topic, arrival.envelope)
+        self._store(arrival)
+        return True
+
+    def _accept_fetched(self, arrival: Arrival) -> None:
+        """Record a message that its source has given again."""
+        self._fetched[arrival.topic.name] += self._accept(arrival)
+        if self._flush_timer.due_in_s() == 0.0:
+            self.flush()
+
+    def _was_fetched(self, arrival: Arrival) -> bool:
+        """Return whether a message comes over the bus that its source had given before."""
+        number = number_of(arrival.envelope)
+        if number is None or arrival.envelope is None:
+            return False
+        return number <= self._fetched_to.get((arrival.topic, arrival.envelope.source), -1)
+
+    def _fetch_rest(self, end_s: float) -> None:
+        """Fetch what the known sources have published since their last message here, until `end_s`
+        at most: they may publish no other that would show it.
+        """
+        for (topic, source), number in self._intake.received_up_to().items():
+            for missed in self._recovery.fetch(topic, source, number + 1, LAST_NUMBER):
+                self._accept_fetched(missed)
+                self._fetched_to[topic, source] = number_of(missed.envelope) or 0
+                if time.monotonic() > end_s:
+                    return
 
     def _store(self, arrival: Arrival) -> None:
         if self.is_paused:

@@ -18,6 +18,7 @@ from cogmap.runtime.company import company_at, watch_company
 from cogmap.runtime.heap import keep_freed_memory
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
+from cogmap.runtime.state import published
 from cogmap.runtime.state.journal import Journal
 from cogmap.runtime.state.outbox import Outbox
 from cogmap.runtime.state.published import PublishedCounts
@@ -116,7 +117,7 @@ def run_module(
     outbox = None
     if state is not None:
         outbox = Outbox(state / f"{module.instance}.outbox")
-        counts = PublishedCounts(state / f"{module.instance}.published")
+        counts = PublishedCounts(state / f"{module.instance}{published.SUFFIX}")
         if module.journal is not None:
             journal = Journal(state / f"{module.instance}.journal")
 

@@ -59,11 +59,13 @@ class Stream:
 class SequenceTracker:
     """Follows the numbers of every source on every topic, from one incarnation to the next.
 
-    A source whose incarnation began after `since_ns` should be there from number 0.
+    A source whose incarnation began after `since_ns` should be there from number 0; on NEVER_DROP
+    topics already one that began after `continues_ns`.
     """
 
-    def __init__(self, since_ns: int | None = None) -> None:
+    def __init__(self, since_ns: int | None = None, continues_ns: int | None = None) -> None:
         self._since_ns = since_ns
+        self._continues_ns = since_ns if continues_ns is None else continues_ns
         self._streams: dict[Key, Stream] = {}
         self._newest: dict[tuple[str, str], Stream] = {}
 
@@ -83,7 +85,9 @@ class SequenceTracker:
             last=envelope.seq,
         )
         self._streams[key] = stream
-        is_new = self._since_ns is not None and stream.incarnation > self._since_ns
+        is_kept = topic.delivery is Delivery.NEVER_DROP
+        since_ns = self._continues_ns if is_kept else self._since_ns
+        is_new = since_ns is not None and stream.incarnation > since_ns
         if is_new and stream.last > 0:
             stream.missing.append((0, stream.last))
 
@@ -98,6 +102,17 @@ class SequenceTracker:
     def streams(self) -> list[Stream]:
         """Return all streams, by topic, source and incarnation."""
         return [self._streams[key] for key in sorted(self._streams)]
+
+    def reached(self) -> dict[str, dict[str, int]]:
+        """Return by topic and source how many messages the source had published, in all its
+        incarnations, with the last one that came; without those that do not count them.
+        """
+        reached: dict[str, dict[str, int]] = {}
+        for stream in self._newest.values():
+            if stream.earlier != UNKNOWN:
+                of_topic = reached.setdefault(stream.topic.name, {})
+                of_topic[stream.source] = stream.earlier + stream.last + 1
+        return reached
 
     def gaps(self) -> list[str]:
         """Return a sentence for each stream that misses numbers, those of NEVER_DROP topics

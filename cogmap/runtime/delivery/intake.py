@@ -65,9 +65,14 @@ class _Stream:
 
 
 class Intake:
-    """Decodes arrivals and counts, by topic, the received, the rejected and the lost (`gaps`)."""
+    """Decodes arrivals and counts, by topic, the received, the rejected and the lost (`gaps`).
 
-    def __init__(self) -> None:
+    A source that began after `since_ns` is missing from its number 0 on; without that, nothing is
+    missing before the first message that comes.
+    """
+
+    def __init__(self, since_ns: int | None = None) -> None:
+        self._since_ns = since_ns
         self.received: Counter[str] = Counter()
         self.rejected: Counter[str] = Counter()
         self.gaps: Counter[str] = Counter()
@@ -101,11 +106,26 @@ class Intake:
         that its source published on `topic`; none if it does not count them.
         """
         stream = self._streams.get((topic, envelope.source))
-        return range(0) if stream is None else stream.before(envelope)
+        if stream is not None:
+            return stream.before(envelope)
+        number = number_of(envelope)
+        is_since = self._since_ns is not None and envelope.incarnation > self._since_ns
+        return range(0) if number is None or not is_since else range(envelope.earlier, number)
 
     def resume(self, topic: Topic, envelope: Envelope) -> None:
         """Go on from a message of `topic` that was received before this process was started."""
-        self._streams[topic, envelope.source] = _Stream(envelope)
+        before = self._streams.get((topic, envelope.source))
+        stream = _Stream(envelope)
+        if before is not None:
+            stream.ended = before.ended | {before.last.incarnation} - {envelope.incarnation}
+        self._streams[topic, envelope.source] = stream
+
+    def received_up_to(self) -> dict[tuple[Topic, str], int]:
+        """Return the number of the last message of each source on each topic, among all that it has
+        published there; without the sources that do not count them.
+        """
+        numbers = {key: number_of(stream.last) for key, stream in self._streams.items()}
+        return {key: number for key, number in numbers.items() if number is not None}
 
     def count_lost(self, topic: str, number: int) -> None:
         """Count messages of `topic` that the bus gave up; called from its threads.

@@ -15,6 +15,7 @@ from cogmap.errors import StorageError
 from cogmap.runtime.state.files import open_file, write_at
 from cogmap.schemas.topics import Topic
 
+SUFFIX = ".published"
 # The name of a topic, padded with zeros, and the count.
 RECORD = struct.Struct("<120sQ")
 COUNT = struct.Struct("<Q")
@@ -52,6 +53,10 @@ class PublishedCounts:
         """Return how many messages of `topic` the earlier incarnations published."""
         return self._earlier.get(topic.name, 0)
 
+    def totals(self) -> dict[str, int]:
+        """Return by topic how many messages all incarnations have published."""
+        return {name: slot.count for name, slot in self._slots.items()}
+
     def add(self, topic: Topic) -> None:
         """Count one message of `topic` that is about to be published."""
         slot = self._slots.get(topic.name)
@@ -72,3 +77,15 @@ class PublishedCounts:
     def close(self) -> None:
         """Close the file; the counts stay in it."""
         os.close(self._file)
+
+
+def published_in(folder: Path) -> dict[str, dict[str, int]]:
+    """Return by instance and topic how many messages those that keep their state in `folder` have
+    published. Raises StorageError if a file there is damaged.
+    """
+    found = {}
+    for path in sorted(folder.glob(f"*{SUFFIX}")):
+        counts = PublishedCounts(path)
+        found[path.name.removesuffix(SUFFIX)] = counts.totals()
+        counts.close()
+    return found
