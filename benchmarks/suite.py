@@ -32,6 +32,7 @@ from benchmarks.map_correction import measure as map_correction
 from benchmarks.map_size import measure as map_size
 from benchmarks.map_structure import measure as map_structure
 from benchmarks.memory import measure as memory
+from benchmarks.partition import measure as partition
 from benchmarks.perception import measure as perception
 from benchmarks.perception import photographs, stereo, towns
 from benchmarks.place_grid import measure as place_grid
@@ -43,6 +44,7 @@ from benchmarks.real import stereo as real_stereo
 from benchmarks.report import Metrics, Outcome, with_machine_unit
 from benchmarks.ros2 import measure as ros2
 from benchmarks.spiking import measure as spiking
+from benchmarks.stall import measure as stall
 from cogmap.errors import CogmapError, UsageError
 from cogmap.parallel import end_workers, exit_with
 
@@ -174,6 +176,8 @@ SUITE = (
         option_thresholds=faults.PART_THRESHOLDS,
     ),
     Benchmark("ros2", ros2.THRESHOLDS, ros2.measure),
+    Benchmark("stall", stall.THRESHOLDS, stall.measure, options=stall.OPTIONS),
+    Benchmark("partition", partition.THRESHOLDS, partition.measure, options=partition.OPTIONS),
     Benchmark("log_api", log_api.THRESHOLDS, log_api.measure, options=log_api.OPTIONS),
     Benchmark(
         "cue-integration",
