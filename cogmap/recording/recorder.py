@@ -22,7 +22,7 @@ from cogmap.recording.storage.sequences import SequenceTracker
 from cogmap.recording.storage.write_queue import LIMIT_BYTES, WriteQueue
 from cogmap.recording.storage.writer import FlushTimer, LogWriter, check_new
 from cogmap.runtime.delivery.intake import Intake, number_of
-from cogmap.runtime.delivery.recovery import Recovery
+from cogmap.runtime.delivery.recovery import TIMEOUT_S, Recovery
 from cogmap.schemas.topics import BY_NAME, Delivery, Topic
 
 log = logging.getLogger("cogmap")
@@ -30,7 +30,7 @@ MODULE = "recorder"
 # How often it looks whether it is to stop.
 IDLE_S = 0.25
 # The most time that fetching may take when it ends, and the greatest number of a message.
-LAST_FETCH_S = 5.0
+LAST_FETCH_S = 3.0
 LAST_NUMBER = 2**63 - 1
 
 
@@ -123,7 +123,7 @@ class Recorder:
         self._queue = WriteQueue(limit_bytes)
         now_ns = time.time_ns()
         continues_ns = began_ns(after, now_ns)
-        self._intake = Intake(continues_ns if after else None)
+        self._intake = Intake(continues_ns)
         self._recovery = Recovery(bus, self._intake)
         self._after = after
         self._fetched: Counter[str] = Counter()
@@ -329,7 +329,12 @@ class Recorder:
         at most: they may publish no other that would show it.
         """
         for (topic, source), number in self._intake.received_up_to().items():
-            for missed in self._recovery.fetch(topic, source, number + 1, LAST_NUMBER):
+            left_s = end_s - time.monotonic()
+            if left_s <= 0.0:
+                return
+            timeout_s = min(left_s, TIMEOUT_S)
+            rest = self._recovery.fetch(topic, source, number + 1, LAST_NUMBER, timeout_s)
+            for missed in rest:
                 self._accept_fetched(missed)
                 self._fetched_to[topic, source] = number_of(missed.envelope) or 0
                 if time.monotonic() > end_s:

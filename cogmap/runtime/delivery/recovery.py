@@ -8,8 +8,9 @@ from cogmap.bus.interface import Arrival, Bus
 from cogmap.runtime.delivery.intake import Intake, number_of
 from cogmap.schemas.topics import Topic
 
-# How long a piece may take: a slow link carries one in a few seconds.
-TIMEOUT_S = 10.0
+# How long a piece may take. If a slow link carries only a part of it meanwhile, the rest is asked
+# for again.
+TIMEOUT_S = 3.0
 
 
 class Recovery:
@@ -30,11 +31,15 @@ class Recovery:
         if missing:
             yield from self.fetch(arrival.topic, envelope.source, missing.start, missing.stop - 1)
 
-    def fetch(self, topic: Topic, source: str, first: int, last: int) -> Iterator[Arrival]:
-        """Yield the messages of `source` with numbers from `first` to `last`, piece by piece."""
+    def fetch(
+        self, topic: Topic, source: str, first: int, last: int, timeout_s: float = TIMEOUT_S
+    ) -> Iterator[Arrival]:
+        """Yield the messages of `source` with numbers from `first` to `last`, piece by piece; each
+        may take `timeout_s`.
+        """
         while first <= last:
             asked = first
-            for arrival in self._bus.fetch_past(topic, source, first, last, TIMEOUT_S):
+            for arrival in self._bus.fetch_past(topic, source, first, last, timeout_s):
                 number = number_of(arrival.envelope)
                 is_next = number is not None and first <= number <= last
                 if not is_next:

@@ -45,13 +45,22 @@ class Run:
     def publish(self, number: int, *, keeps: bool = True) -> None:
         """Publish so many messages, which a source that `keeps` them has in its outbox."""
         for _ in range(number):
-            message = odometry(self.published)
-            envelope = Envelope("sim", message.seq, LATER_NS, 1, 1, earlier=0)
-            payload = encode(message)
-            if keeps:
-                self.outbox.append(topics.ODOMETRY, message.seq, encode(envelope), payload)
+            envelope, payload = self._next(keeps)
             self.bus.publish(topics.ODOMETRY, payload, envelope)
-            self.published += 1
+
+    def lose(self, number: int) -> None:
+        """Publish so many messages, which the source keeps, that reach nobody."""
+        for _ in range(number):
+            self._next(keeps=True)
+
+    def _next(self, keeps: bool) -> tuple[Envelope, bytes]:
+        message = odometry(self.published)
+        envelope = Envelope("sim", message.seq, LATER_NS, 1, 1, earlier=0)
+        payload = encode(message)
+        if keeps:
+            self.outbox.append(topics.ODOMETRY, message.seq, encode(envelope), payload)
+        self.published += 1
+        return envelope, payload
 
     def kill(self, recorder: Recorder) -> None:
         """End a recorder without a summary in its log."""
@@ -168,13 +177,22 @@ def test_a_recorder_that_ends_fetches_what_the_bus_has_not_delivered(run: Run) -
     recorder = run.record("log.mcap")
     run.publish(3)
     pump_all(recorder)
-    message = odometry(3)
-    envelope = Envelope("sim", 3, LATER_NS, 1, 1, earlier=0)
-    run.outbox.append(topics.ODOMETRY, 3, encode(envelope), encode(message))
+    run.lose(1)
 
     recorder.close()
 
     assert run.recorded() == [0, 1, 2, 3]
+
+
+def test_the_first_messages_of_a_source_that_began_later_are_fetched(run: Run) -> None:
+    recorder = run.record("log.mcap")
+    run.lose(2)
+    run.publish(1)
+
+    summary = finished(recorder)
+
+    assert run.recorded() == [0, 1, 2]
+    assert summary.never_drop_whole
 
 
 def test_logs_are_in_the_order_in_which_they_were_begun(tmp_path: Path) -> None:
