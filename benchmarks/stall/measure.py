@@ -59,11 +59,13 @@ OPTIONS = (
 
 @dataclass(frozen=True)
 class Stop:
-    """What one stop did. `before_s` is the longest time without a delta before it, over a shorter
-    while; `again` counts what the recorder fetched from the sources.
+    """What one stop did. `stopped_gap_s` is the longest time without a delta during it, and
+    `after_gap_s` afterwards, `before_s` over a shorter while before it; `again` counts what the
+    recorder fetched from the sources.
     """
 
-    gap_s: float
+    stopped_gap_s: float
+    after_gap_s: float
     before_s: float
     missed: int
     again: int
@@ -71,6 +73,11 @@ class Stop:
     unsaid: int
     growth_mb: float
     recovered_s: float
+
+    @property
+    def gap_s(self) -> float:
+        """Return the longest time without a delta during the stop and afterwards."""
+        return max(self.stopped_gap_s, self.after_gap_s)
 
 
 def measure(
@@ -124,7 +131,8 @@ def _stop(agent: Agent, witness: Witness, recorder: Recorder, stop_s: float, end
         if time.monotonic() > end_s:
             break
     recovered_s = time.monotonic() - continued_s
-    gap_s = witness.gap_s(stopped_s, time.monotonic())
+    stopped_gap_s = witness.gap_s(stopped_s, continued_s)
+    after_gap_s = witness.gap_s(continued_s, time.monotonic())
 
     expected = witness.numbers()
     summary = recorder.finish()
@@ -132,7 +140,8 @@ def _stop(agent: Agent, witness: Witness, recorder: Recorder, stop_s: float, end
     told = Counter(summary["lost"])
     unsaid = {name: max(0, number - told[name]) for name, number in lost.items()}
     return Stop(
-        gap_s=gap_s,
+        stopped_gap_s=stopped_gap_s,
+        after_gap_s=after_gap_s,
         before_s=before_s,
         missed=_size(at_end) - _size(at_stop),
         again=sum(summary["fetched"].values()),
@@ -199,7 +208,8 @@ def _metrics(found: dict[float, Stop]) -> Metrics:
     }
     for stop_s, stop in found.items():
         prefix = f"stop_{stop_s:g}s"
-        metrics[f"{prefix}_gap_s"] = stop.gap_s
+        metrics[f"{prefix}_gap_s"] = stop.stopped_gap_s
+        metrics[f"{prefix}_gap_after_s"] = stop.after_gap_s
         metrics[f"{prefix}_gap_before_s"] = stop.before_s
         metrics[f"{prefix}_missed"] = float(stop.missed)
         metrics[f"{prefix}_fetched"] = float(stop.again)

@@ -10,8 +10,8 @@ from cogmap.schemas.topics import Topic
 KEPT_S = 330.0
 """How long a subscriber may be away and still get everything: five minutes, and time to connect."""
 
-CACHE_BYTES = 8 * 2**20
-"""About the most that the cache of one topic takes."""
+CACHE_BYTES = 2 * 2**20
+"""About the most that the cache of one topic takes. All of it travels at once to who missed it."""
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,8 @@ class Bus(Protocol):
     ) -> list[Arrival]:
         """Ask `source` for its messages of `topic` with numbers from `first` to `last`.
 
-        Returns a piece of them, in order; none if there are none, or nobody answers.
+        Returns a piece of them, in order; none if there are none, or `source` is not there. Raises
+        NoAnswerError if it is there and does not answer in time.
         """
 
     def announce(self, member: Member) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -31,6 +32,9 @@ RECOVERY_PERIOD = timedelta(seconds=0.5)
 # and one of the periodic queries above, which have the default, comes in between, Zenoh 1.10 sends
 # neither and closes the link after 5 s.
 ANSWER_PRIORITY = zenoh.Priority.BACKGROUND
+# Zenoh answers from a cache on the thread that receives, with the cache locked: if it waited there
+# for a slow link, so would all that is published and received. The outbox has what is dropped.
+CACHE_REPLIES = ext.RepliesConfig(congestion_control=zenoh.CongestionControl.DROP)
 _LARGE_BYTES = 8 * 2**20
 # An image travels in batches, through the router and two threads in each process. On two cores it
 # takes twice as long while the thread that has published it computes on.
@@ -66,6 +70,8 @@ class ZenohBus:
         self._publishers: dict[Topic, Any] = {}
         self._declared: list[_Closable] = []
         self._is_named = False
+        # Answers of many messages, which wait for a slow link: Zenoh's thread receives meanwhile.
+        self._aside = ThreadPoolExecutor(1)
 
     @property
     def session(self) -> zenoh.Session:
@@ -103,7 +109,7 @@ class ZenohBus:
             key,
             encoding=encoding(topic),
             congestion_control=zenoh.CongestionControl.DROP,
-            cache=ext.CacheConfig(max_samples=cached_messages(topic)),
+            cache=ext.CacheConfig(cached_messages(topic), replies_config=CACHE_REPLIES),
             sample_miss_detection=ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=None),
             publisher_detection=True,
             priority=_priority(topic),
@@ -211,7 +217,9 @@ class ZenohBus:
                     )
 
         key = past_key(self._agent, topic, source)
-        self._declared.append(self._session.declare_queryable(key, respond))
+        self._declared.append(
+            self._session.declare_queryable(key, lambda query: self._aside.submit(respond, query))
+        )
 
     def fetch_past(
         self, topic: Topic, source: str, first: int, last: int, timeout_s: float
@@ -225,11 +233,16 @@ class ZenohBus:
             timeout=timeout_s,
         )
         found = []
+        reason = ""
         for reply in replies:
             if reply.ok is not None:
                 now_ns = time.time_ns()
                 payload = bytes(reply.ok.payload)
                 found.append(Arrival(topic, payload, _envelope(reply.ok), now_ns))
+            elif reply.err is not None:
+                reason = bytes(reply.err.payload).decode(errors="replace")
+        if reason and not found:
+            raise NoAnswerError(f"{source} does not answer for {topic.name}: {reason}")
         return found
 
     def announce(self, member: Member) -> None:
@@ -266,6 +279,7 @@ class ZenohBus:
         while self._publishers:
             _, publisher = self._publishers.popitem()
             publisher.undeclare()
+        self._aside.shutdown(cancel_futures=True)
         self._session.close()  # type: ignore[no-untyped-call]
 
 

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator
 
 from cogmap.bus.interface import Arrival, Bus
+from cogmap.errors import NoAnswerError
 from cogmap.runtime.delivery.intake import Intake, number_of
 from cogmap.schemas.topics import Topic
 
+log = logging.getLogger("cogmap")
 # How long a piece may take. If a slow link carries only a part of it meanwhile, the rest is asked
 # for again.
 TIMEOUT_S = 3.0
+# How often to ask a source that does not answer in time.
+TRIES = 4
 
 
 class Recovery:
@@ -39,13 +44,22 @@ class Recovery:
         """
         while first <= last:
             asked = first
-            for arrival in self._bus.fetch_past(topic, source, first, last, timeout_s):
+            for arrival in self._piece(topic, source, first, last, timeout_s):
                 number = number_of(arrival.envelope)
-                is_next = number is not None and first <= number <= last
-                if not is_next:
+                if number is None or not first <= number <= last:
                     continue
-                assert number is not None
                 first = number + 1
                 yield arrival
             if first == asked:
                 return
+
+    def _piece(
+        self, topic: Topic, source: str, first: int, last: int, timeout_s: float
+    ) -> list[Arrival]:
+        """Ask for the messages, again if no answer comes; return none if none comes at all."""
+        for _ in range(TRIES):
+            try:
+                return self._bus.fetch_past(topic, source, first, last, timeout_s)
+            except NoAnswerError as error:
+                log.debug("%s", error)
+        return []
