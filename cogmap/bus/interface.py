@@ -103,8 +103,8 @@ class Bus(Protocol):
     ) -> list[Arrival]:
         """Ask `source` for its messages of `topic` with numbers from `first` to `last`.
 
-        Returns a piece of them, in order; none if there are none, or `source` is not there. Raises
-        NoAnswerError if it is there and does not answer in time.
+        Returns a piece of them, in order, none if it has none. Raises NoAnswerError if `source` is
+        not there, or does not answer in time.
         """
 
     def announce(self, member: Member) -> None:

@@ -128,7 +128,7 @@ class MemoryBus:
     ) -> list[Arrival]:
         past = self._network.pasts.get((topic, source))
         if past is None:
-            return []
+            raise NoAnswerError(f"{source} does not answer for {topic.name}")
         now_ns = time.time_ns()
         sent = past(topic, first, last)
         return [

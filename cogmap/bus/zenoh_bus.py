@@ -35,6 +35,7 @@ ANSWER_PRIORITY = zenoh.Priority.BACKGROUND
 # Zenoh answers from a cache on the thread that receives, with the cache locked: if it waited there
 # for a slow link, so would all that is published and received. The outbox has what is dropped.
 CACHE_REPLIES = ext.RepliesConfig(congestion_control=zenoh.CongestionControl.DROP)
+NONE_KEPT = b"none of them are kept"
 _LARGE_BYTES = 8 * 2**20
 # An image travels in batches, through the router and two threads in each process. On two cores it
 # takes twice as long while the thread that has published it computes on.
@@ -208,7 +209,10 @@ class ZenohBus:
                 except ValueError:
                     query.reply_err(b"which messages? Add first=NUMBER;last=NUMBER")
                     return
-                for sent in past(topic, first, last):
+                found = past(topic, first, last)
+                if not found:
+                    query.reply_err(NONE_KEPT)
+                for sent in found:
                     query.reply(
                         query.key_expr,
                         sent.payload,
@@ -225,7 +229,7 @@ class ZenohBus:
         self, topic: Topic, source: str, first: int, last: int, timeout_s: float
     ) -> list[Arrival]:
         if not is_name(source):
-            return []
+            raise NoAnswerError(f"{source!r} is no name of a source")
         replies = self._session.get(
             f"{past_key(self._agent, topic, source)}?first={first};last={last}",
             priority=ANSWER_PRIORITY,
@@ -233,17 +237,18 @@ class ZenohBus:
             timeout=timeout_s,
         )
         found = []
-        reason = ""
+        reason = b"it is not there"
         for reply in replies:
             if reply.ok is not None:
                 now_ns = time.time_ns()
                 payload = bytes(reply.ok.payload)
                 found.append(Arrival(topic, payload, _envelope(reply.ok), now_ns))
             elif reply.err is not None:
-                reason = bytes(reply.err.payload).decode(errors="replace")
-        if reason and not found:
-            raise NoAnswerError(f"{source} does not answer for {topic.name}: {reason}")
-        return found
+                reason = bytes(reply.err.payload)
+        if found or reason == NONE_KEPT:
+            return found
+        why = reason.decode(errors="replace")
+        raise NoAnswerError(f"{source} does not answer for {topic.name}: {why}")
 
     def announce(self, member: Member) -> None:
         self.identify(member)

@@ -22,7 +22,7 @@ from cogmap.recording.storage.sequences import SequenceTracker
 from cogmap.recording.storage.write_queue import LIMIT_BYTES, WriteQueue
 from cogmap.recording.storage.writer import FlushTimer, LogWriter, check_new
 from cogmap.runtime.delivery.intake import Intake, number_of
-from cogmap.runtime.delivery.recovery import TIMEOUT_S, TRIES, Recovery
+from cogmap.runtime.delivery.recovery import TIMEOUT_S, Recovery
 from cogmap.schemas.topics import BY_NAME, Delivery, Topic
 
 log = logging.getLogger("cogmap")
@@ -332,8 +332,10 @@ class Recorder:
             left_s = end_s - time.monotonic()
             if left_s <= 0.0:
                 return
-            timeout_s = min(left_s / TRIES, TIMEOUT_S)
-            rest = self._recovery.fetch(topic, source, number + 1, LAST_NUMBER, timeout_s)
+            timeout_s = min(left_s, TIMEOUT_S)
+            rest = self._recovery.fetch(
+                topic, source, number + 1, LAST_NUMBER, timeout_s=timeout_s, tries=1
+            )
             for missed in rest:
                 self._accept_fetched(missed)
                 self._fetched_to[topic, source] = number_of(missed.envelope) or 0

@@ -10,7 +10,7 @@ import pytest
 from cogmap.bus.codec import Envelope, decode_envelope, encode
 from cogmap.bus.depth import CACHE_BYTES, KEPT_S, cached_messages, flow_of
 from cogmap.bus.interface import Sent
-from cogmap.errors import StorageError
+from cogmap.errors import NoAnswerError, StorageError
 from cogmap.runtime.state.outbox import HEAD, PIECE_BYTES, Outbox
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Delivery, Topic
@@ -153,11 +153,21 @@ def test_a_source_answers_for_what_it_published(network: Network, outbox: Outbox
 
 
 @pytest.mark.parametrize("source", ["nobody", "no/name*"])
-def test_a_source_that_is_not_there_has_nothing(network: Network, source: str) -> None:
-    assert network.join().fetch_past(topics.ODOMETRY, source, 0, 9, TIMEOUT_S) == []
+def test_a_source_that_is_not_there_does_not_answer(network: Network, source: str) -> None:
+    with pytest.raises(NoAnswerError):
+        network.join().fetch_past(topics.ODOMETRY, source, 0, 9, TIMEOUT_S)
 
 
-def test_a_source_that_has_left_has_nothing(network: Network, outbox: Outbox) -> None:
+def test_a_source_that_has_kept_none_says_so(network: Network, outbox: Outbox) -> None:
+    asker = network.join()
+    source = network.join()
+    source.serve_past(topics.ODOMETRY, "sim", outbox.read)
+    meet(asker, source)
+
+    assert asker.fetch_past(topics.ODOMETRY, "sim", 4, 6, TIMEOUT_S) == []
+
+
+def test_a_source_that_has_left_does_not_answer(network: Network, outbox: Outbox) -> None:
     asker = network.join()
     source = network.join()
     append(outbox, range(10))
@@ -165,4 +175,5 @@ def test_a_source_that_has_left_has_nothing(network: Network, outbox: Outbox) ->
     meet(asker, source)
     source.close()
 
-    assert asker.fetch_past(topics.ODOMETRY, "sim", 0, 9, TIMEOUT_S) == []
+    with pytest.raises(NoAnswerError):
+        asker.fetch_past(topics.ODOMETRY, "sim", 0, 9, TIMEOUT_S)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 from collections.abc import Iterator
 
 from cogmap.bus.interface import Arrival, Bus
@@ -14,8 +15,10 @@ log = logging.getLogger("cogmap")
 # How long a piece may take. If a slow link carries only a part of it meanwhile, the rest is asked
 # for again.
 TIMEOUT_S = 3.0
-# How often to ask a source that does not answer in time.
-TRIES = 4
+# How often to ask a source that does not answer, and how long to wait in between: a router that has
+# just come back learns of those who answer a moment after their messages.
+TRIES = 5
+RETRY_S = 0.4
 
 
 class Recovery:
@@ -24,6 +27,7 @@ class Recovery:
     def __init__(self, bus: Bus, intake: Intake) -> None:
         self._bus = bus
         self._intake = intake
+        self._pause = threading.Event()
 
     def before(self, arrival: Arrival) -> Iterator[Arrival]:
         """Yield the messages that are missing before `arrival`, in order, as far as its source has
@@ -37,14 +41,22 @@ class Recovery:
             yield from self.fetch(arrival.topic, envelope.source, missing.start, missing.stop - 1)
 
     def fetch(
-        self, topic: Topic, source: str, first: int, last: int, timeout_s: float = TIMEOUT_S
+        self,
+        topic: Topic,
+        source: str,
+        first: int,
+        last: int,
+        *,
+        timeout_s: float = TIMEOUT_S,
+        tries: int = TRIES,
     ) -> Iterator[Arrival]:
         """Yield the messages of `source` with numbers from `first` to `last`, piece by piece; each
-        may take `timeout_s`.
+        may take `timeout_s`, and is asked for `tries` times if no answer comes.
         """
         while first <= last:
             asked = first
-            for arrival in self._piece(topic, source, first, last, timeout_s):
+            answer = self._answer(topic, source, range(first, last + 1), timeout_s, tries)
+            for arrival in answer:
                 number = number_of(arrival.envelope)
                 if number is None or not first <= number <= last:
                     continue
@@ -53,13 +65,18 @@ class Recovery:
             if first == asked:
                 return
 
-    def _piece(
-        self, topic: Topic, source: str, first: int, last: int, timeout_s: float
+    def _answer(
+        self, topic: Topic, source: str, numbers: range, timeout_s: float, tries: int
     ) -> list[Arrival]:
-        """Ask for the messages, again if no answer comes; return none if none comes at all."""
-        for _ in range(TRIES):
+        """Ask for the messages with these numbers, again if no answer comes; return none if none
+        comes at all.
+        """
+        for attempt in range(tries):
+            if attempt > 0:
+                self._pause.wait(RETRY_S)
             try:
-                return self._bus.fetch_past(topic, source, first, last, timeout_s)
+                last = numbers.stop - 1
+                return self._bus.fetch_past(topic, source, numbers.start, last, timeout_s)
             except NoAnswerError as error:
                 log.debug("%s", error)
         return []
