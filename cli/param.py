@@ -14,6 +14,7 @@ from cogmap.cli.options import json_option
 from cogmap.cli.printing import print_json
 from cogmap.cli.topic.observing import observing
 from cogmap.errors import MessageError, NoAnswerError, UsageError
+from cogmap.files.toml import parsed
 from cogmap.hints import did_you_mean
 from cogmap.runtime import config
 from cogmap.runtime.config import Sections
@@ -101,7 +102,7 @@ def settings_of(bus: Bus, timeout_s: float) -> Sections:
     try:
         settings = decode(topics.SETTINGS, answer.payload)
         assert isinstance(settings, Settings)
-        given = tomllib.loads(settings.toml)
+        given = parsed(settings.toml)
     except (MessageError, tomllib.TOMLDecodeError) as error:
         raise NoAnswerError(f"the answer has no settings: {error}") from None
 

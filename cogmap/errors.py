@@ -31,6 +31,10 @@ class LogError(UsageError):
     """A log file is missing, damaged, or not one of ours."""
 
 
+class BoundError(UsageError):
+    """A file holds or takes more than it may; the sentence names the bound and how to raise it."""
+
+
 class StorageError(UsageError):
     """What a module must keep cannot be written: the disk is full, or the folder read-only."""
 

@@ -93,6 +93,8 @@ def effective(base: Sections, choices: Choices, observer: bool) -> Sections:
     and the default of every other key. Raises ConfigError.
     """
     config.check_sections(base, registry.sections())
+    for name in base:
+        config.typed(base, name, registry.config_type(name))
     if choices.laps is not None and not _has_laps(base, choices):
         raise ConfigError(
             "--laps is for the loop town, and a drive without goals of its own: leave it out"

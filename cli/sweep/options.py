@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from cogmap.errors import ConfigError, UsageError
+from cogmap.files.toml import parsed
 
 MAX_SEEDS = 10_000
 _SEEDS = re.compile(r"(\d+)(?:-(\d+))?")
@@ -45,7 +46,7 @@ def every_variant(texts: Sequence[str]) -> list[dict[str, Any]]:
 def _values(text: str) -> list[Any]:
     """Read values that commas part: as TOML has them, or words, which need no quotes."""
     try:
-        values: list[Any] = tomllib.loads(f"values = [{text}]")["values"]
+        values: list[Any] = parsed(f"values = [{text}]")["values"]
     except tomllib.TOMLDecodeError:
         return [word.strip() for word in text.split(",")]
     return values

@@ -30,6 +30,7 @@ import numpy as np
 from cogmap.data.stereo_recording import StereoRecording, checked_stamps, pair_size_px
 from cogmap.data.text import numbered_lines, read_bytes
 from cogmap.errors import UsageError
+from cogmap.files.toml import parsed
 from cogmap.geometry.arrays import Indices
 from cogmap.schemas.base import Finite, Metres
 from cogmap.schemas.sensing import Calibration
@@ -99,7 +100,7 @@ def _camera(path: Path) -> CameraFile:
             "cy_px, baseline_m, mount_height_m and rate_hz, as docs/real.md has it"
         )
     try:
-        written = tomllib.loads(read_bytes(path, GIVE).decode("utf-8", "replace"))
+        written = parsed(read_bytes(path, GIVE).decode("utf-8", "replace"))
         return msgspec.convert(written, CameraFile)
     except tomllib.TOMLDecodeError as error:
         raise UsageError(f"{path} is no TOML ({error}): correct that line") from None

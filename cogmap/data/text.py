@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import bz2
 import codecs
-import gzip
-import lzma
-import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, NamedTuple, cast
+from typing import IO, NamedTuple
 
 from cogmap.errors import UsageError
+from cogmap.files.packed import DAMAGE, SUFFIXES, opened
 
-PACKED = ("", ".gz", ".bz2", ".xz")
+PACKED = SUFFIXES
 MAX_SHOWN = 60
-# A packed file is known by its first bytes: names may be wrong.
-_OPENERS: dict[bytes, Callable[[Path], object]] = {
-    b"\x1f\x8b": gzip.open,
-    b"BZh": bz2.open,
-    b"\xfd7zXZ\x00": lzma.open,
-}
 
 
 class Line(NamedTuple):
@@ -44,7 +35,8 @@ class Line(NamedTuple):
 def numbered_lines(path: Path, give: str) -> Iterator[Line]:
     """Yield the lines of a file, unpacked, without a byte-order mark.
 
-    Raises UsageError if it cannot be read, with the remedy to give `give`.
+    Raises UsageError if it cannot be read, with the remedy to give `give`; BoundError if it holds
+    more than a file may.
     """
     with _opened(path, give) as file:
         for number, line in enumerate(file, start=1):
@@ -74,13 +66,9 @@ def plain_or_packed(folder: Path, name: str) -> Path | None:
 @contextmanager
 def _opened(path: Path, give: str) -> Iterator[IO[bytes]]:
     try:
-        with path.open("rb") as plain:
-            beginning = plain.read(max(map(len, _OPENERS)))
-
-        opener = next((of for magic, of in _OPENERS.items() if beginning.startswith(magic)), None)
-        with cast("IO[bytes]", opener(path) if opener else path.open("rb")) as file:
+        with opened(path) as file:
             yield file
     except FileNotFoundError:
         raise UsageError(f"there is no file {path}: give {give}") from None
-    except (OSError, EOFError, lzma.LZMAError, zlib.error) as error:
+    except DAMAGE as error:
         raise UsageError(f"{path} cannot be read ({error}): give {give}, all of it") from error

@@ -11,6 +11,8 @@ from typing import TypeVar
 import msgspec
 
 from cogmap.errors import ConfigError
+from cogmap.files.packed import read_text
+from cogmap.files.toml import parsed
 from cogmap.hints import did_you_mean
 
 S = TypeVar("S", bound=msgspec.Struct)
@@ -106,7 +108,7 @@ def read_tables(path: Path, kind: type[S], what: str, remedy: str) -> tuple[Sour
     Raises ConfigError that names the file, and the line of what is wrong in it.
     """
     try:
-        text = path.read_text("utf-8")
+        text = read_text(path)
     except FileNotFoundError:
         raise ConfigError(f"no {what} {path}: {remedy}") from None
     except (UnicodeDecodeError, OSError) as error:
@@ -114,7 +116,7 @@ def read_tables(path: Path, kind: type[S], what: str, remedy: str) -> tuple[Sour
 
     source = Source(path, text)
     try:
-        return source, msgspec.convert(tomllib.loads(text), kind)
+        return source, msgspec.convert(parsed(text), kind)
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"cannot read {path} as TOML: {error}") from None
     except msgspec.ValidationError as error:

@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 import msgspec
 
 from cogmap.errors import ConfigError
+from cogmap.files.packed import read_text
+from cogmap.files.toml import parsed
 from cogmap.hints import did_you_mean
 
 C = TypeVar("C", bound=msgspec.Struct)
@@ -26,7 +28,7 @@ def load(path: Path | None, settings: Iterable[str] = ()) -> Sections:
     sections: Sections = {}
     if path is not None:
         try:
-            sections = tomllib.loads(path.read_text())
+            sections = parsed(read_text(path))
         except FileNotFoundError:
             raise ConfigError(
                 f"no configuration file {path}: name one that exists, or leave --config out"
@@ -42,7 +44,7 @@ def load(path: Path | None, settings: Iterable[str] = ()) -> Sections:
 
         keys = _keys_of(section, sections.setdefault(section, {}))
         try:
-            keys[name] = tomllib.loads(f"value = {value}")["value"]
+            keys[name] = parsed(f"value = {value}")["value"]
         except tomllib.TOMLDecodeError:
             # A word needs no quotes.
             keys[name] = value

@@ -10,9 +10,11 @@ from typing import Any
 import msgspec
 import numpy as np
 
+from cogmap.errors import UsageError
 from cogmap.experiments.city_maps import drive, self_driven
 from cogmap.experiments.city_maps.guide import Outcome
 from cogmap.experiments.city_maps.observer import Traversal
+from cogmap.files.packed import read_arrays
 from cogmap.runtime.config import Sections
 from cogmap.version import VERSION
 
@@ -59,12 +61,14 @@ def _write(path: Path, found: Traversal) -> None:
 
 
 def _read(path: Path) -> Traversal:
-    with np.load(path) as columns:
-        arrays = {name: columns[name] for name in columns.files}
-
-    alone = [name for name in arrays if name.startswith(ALONE)]
-    alone_m = {name.removeprefix(ALONE): arrays.pop(name) for name in alone}
-    outcome = None
-    if OUTCOME in arrays:
-        outcome = msgspec.json.decode(str(arrays.pop(OUTCOME)), type=Outcome)
-    return Traversal(alone_m=alone_m, outcome=outcome, **arrays)
+    """Read a traversal. Raises UsageError if the file is damaged."""
+    try:
+        arrays: dict[str, Any] = read_arrays(path)
+        alone = [name for name in arrays if name.startswith(ALONE)]
+        alone_m = {name.removeprefix(ALONE): arrays.pop(name) for name in alone}
+        outcome = None
+        if OUTCOME in arrays:
+            outcome = msgspec.json.decode(str(arrays.pop(OUTCOME)), type=Outcome)
+        return Traversal(alone_m=alone_m, outcome=outcome, **arrays)
+    except (OSError, ValueError, TypeError, msgspec.DecodeError) as error:
+        raise UsageError(f"{path} is damaged ({error}): remove it, and it is made anew") from None

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import msgspec
-import numpy as np
 
 from cogmap.errors import UsageError
+from cogmap.files.packed import read_arrays
 from cogmap.geometry.arrays import Bytes, Floats, Singles
 from cogmap.schemas.sensing import Calibration
 
@@ -42,11 +43,11 @@ class Town:
 def read(path: Path) -> Town:
     """Return the town in the file at `path`. Raises UsageError if it does not hold one."""
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            calibration = msgspec.json.decode(stored["calibration"].tobytes(), type=Calibration)
-            arrays = {key: stored[key] for key in ARRAYS}
-            names = tuple(str(name) for name in stored["names"])
-            return Town(**arrays, names=names, calibration=calibration)
+        stored = read_arrays(path)
+        calibration = msgspec.json.decode(stored["calibration"].tobytes(), type=Calibration)
+        arrays: dict[str, Any] = {key: stored[key] for key in ARRAYS}
+        names = tuple(str(name) for name in stored["names"])
+        return Town(**arrays, names=names, calibration=calibration)
     except (OSError, ValueError, KeyError, msgspec.DecodeError) as error:
         raise UsageError(
             f"{path} holds no renderings ({error}): write them with cogmap train render"

@@ -8,7 +8,7 @@ first record that is not whole.
 from __future__ import annotations
 
 import struct
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from io import BytesIO
@@ -28,25 +28,27 @@ from mcap.records import (
     MessageIndex,
     Metadata,
 )
-from mcap.stream_reader import StreamReader, breakup_chunk, get_chunk_data_stream
+from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
 
-from cogmap.errors import LogError
+from cogmap.errors import BoundError, LogError
+from cogmap.files.bounds import MIB, Budget, most_unpacked
+from cogmap.recording.storage.chunks import (
+    RECORD_HEADER,
+    DamageError,
+    messages_at,
+    open_chunk,
+    unpacked,
+)
 from cogmap.recording.storage.format import LOG_NAME
 
-# Of any record: its opcode and its length. Of a message also its channel, its sequence, and when it
-# was received and sent; of an index of messages its channel, and the bytes of its entries: the time
-# of a message, and where it is in its chunk.
-RECORD_HEADER_BYTES = 9
-MESSAGE_HEADER = struct.Struct("<BQHIQQ")
+# Of an index of messages its channel, and the bytes of its entries: the time of a message, and
+# where it is in its chunk.
 INDEX_HEADER = struct.Struct("<BQHI")
 INDEX_ENTRY = struct.Struct("<QQ")
 # A run of messages outside chunks is read at once: about what a chunk of ours holds.
 RUN_BYTES = 1 << 20
-
-
-class DamageError(Exception):
-    """A part of a log cannot be read. Whoever catches it knows which, and names it."""
+METADATA_BYTES = 64 * MIB
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +65,7 @@ class ChunkSpan:
     first_ns: int
     last_ns: int
     is_chunk: bool = True
-    indexes: Mapping[int, int] | None = None
+    indexes: dict[int, int] | None = None
 
     def has_any(self, channels: frozenset[int]) -> bool:
         """Return whether messages on one of these channels may be in it."""
@@ -119,30 +121,24 @@ def read_index(path: Path) -> LogIndex:
 
 def read_chunk(path: Path, chunk: ChunkSpan) -> list[McapRecord]:
     """Read the schemas, channels and messages in a chunk, as written. Raises DamageError."""
-    records: list[McapRecord] = []
     try:
         with path.open("rb") as file:
             file.seek(chunk.offset)
-            reader = StreamReader(file, skip_magic=True, emit_chunks=True)
-            for record in reader.records:
-                records += open_chunk(record) if isinstance(record, Chunk) else [record]
-                if file.tell() >= chunk.end:
-                    break
+            content = BytesIO(file.read(chunk.end - chunk.offset))
+
+        records: list[McapRecord] = []
+        reader = StreamReader(content, skip_magic=True, emit_chunks=True)
+        for record in reader.records:
+            records += open_chunk(record) if isinstance(record, Chunk) else [record]
+            if content.tell() >= chunk.end - chunk.offset:
+                break
         return records
     except OSError as error:
         raise LogError(f"cannot read {path}: {error.strerror}") from None
     except DamageError:
         raise
     except Exception as error:  # the library raises whatever the nonsense in it leads to
-        raise DamageError(str(error)) from error
-
-
-def open_chunk(chunk: Chunk) -> list[McapRecord]:
-    """Unpack the records of a chunk. Raises DamageError, also for a wrong checksum."""
-    try:
-        return breakup_chunk(chunk, validate_crc=True)
-    except Exception as error:  # each decompressor has errors of its own
-        raise DamageError(str(error)) from error
+        raise DamageError(str(error) or type(error).__name__) from error
 
 
 def read_messages(file: BinaryIO, chunk: ChunkSpan, channels: Collection[int]) -> list[Message]:
@@ -155,20 +151,19 @@ def read_messages(file: BinaryIO, chunk: ChunkSpan, channels: Collection[int]) -
         return []
 
     try:
-        file.seek(chunk.offset + RECORD_HEADER_BYTES)
+        file.seek(chunk.offset + RECORD_HEADER.size)
         record = Chunk.read(ReadDataStream(BytesIO(file.read(chunk.end - file.tell()))))
-        stream, size = get_chunk_data_stream(record, validate_crc=True)
-        contents = stream.read(size)
+        contents = unpacked(record)
         found: list[Message] = []
         for channel in indexed:
-            found += _at_offsets(contents, _offsets(file, chunk.indexes[channel]), channel)
+            found += messages_at(contents, _offsets(file, chunk.indexes[channel]), channel)
         return found
     except OSError as error:
         raise LogError(f"cannot read {file.name}: {error.strerror}") from None
     except DamageError:
         raise
     except Exception as error:  # the library raises whatever the nonsense in it leads to
-        raise DamageError(str(error)) from error
+        raise DamageError(str(error) or type(error).__name__) from error
 
 
 def channels_in(records: list[McapRecord]) -> dict[int, Channel]:
@@ -194,24 +189,6 @@ def _offsets(file: BinaryIO, where: int) -> list[int]:
     return sorted(offset for _, offset in INDEX_ENTRY.iter_unpack(file.read(size)))
 
 
-def _at_offsets(contents: bytes, offsets: list[int], channel: int) -> list[Message]:
-    """Read the messages of a channel at these offsets in a chunk. Raises DamageError if another
-    record is there.
-    """
-    found = []
-    for offset in offsets:
-        opcode, length, its_channel, sequence, log_time_ns, sent_ns = MESSAGE_HEADER.unpack_from(
-            contents, offset
-        )
-        if opcode != Opcode.MESSAGE or its_channel != channel:
-            raise DamageError(f"its index leads to another record at {offset}")
-
-        end = offset + RECORD_HEADER_BYTES + length
-        data = contents[offset + MESSAGE_HEADER.size : end]
-        found.append(Message(channel, log_time_ns, data, sent_ns, sequence))
-    return found
-
-
 def _from_summary(path: Path) -> LogIndex | None:
     """Read the index of chunks at the end of a log; None if there is none, or it is damaged."""
     try:
@@ -226,7 +203,9 @@ def _from_summary(path: Path) -> LogIndex | None:
             if facts.metadata_count != len(summary.metadata_indexes):
                 return None
             header = reader.get_header()
-            metadata = [(record.name, record.metadata) for record in reader.iter_metadata()]
+            metadata = _bounded_metadata(path, reader)
+    except BoundError:
+        raise
     except Exception:  # the library raises whatever the nonsense in it leads to
         return None
 
@@ -240,7 +219,30 @@ def _from_summary(path: Path) -> LogIndex | None:
         )
         for chunk in summary.chunk_indexes
     ]
+    if not _are_apart(chunks, path.stat().st_size):
+        return None
     return LogIndex(header.library, dict(summary.channels), metadata, chunks)
+
+
+def _bounded_metadata(path: Path, reader: SeekingReader) -> list[tuple[str, dict[str, str]]]:
+    """Read the metadata of a log, of which many indexes may name one record. Raises BoundError."""
+    budget = Budget(path, "has metadata of", most_unpacked(path.stat().st_size, METADATA_BYTES))
+    metadata = []
+    for record in reader.iter_metadata():
+        facts = record.metadata
+        budget.take(len(record.name) + sum(map(len, facts)) + sum(map(len, facts.values())))
+        metadata.append((record.name, facts))
+    return metadata
+
+
+def _are_apart(chunks: Sequence[ChunkSpan], size: int) -> bool:
+    """Decide whether chunks lie one after the other in a file of that size."""
+    reached = len(MCAP0_MAGIC)
+    for chunk in sorted(chunks, key=lambda chunk: chunk.offset):
+        if not reached <= chunk.offset < chunk.end:
+            return False
+        reached = chunk.end
+    return reached <= size
 
 
 def _from_scan(path: Path) -> LogIndex:
@@ -282,8 +284,10 @@ def _enter(index: LogIndex, record: McapRecord, offset: int, end: int) -> None:
             index.chunks.append(span)
         case MessageIndex() if index.chunks:
             chunk = index.chunks[-1]
-            indexes = {**(chunk.indexes or {}), record.channel_id: offset}
-            index.chunks[-1] = replace(chunk, indexes=indexes)
+            indexes = {} if chunk.indexes is None else chunk.indexes
+            indexes[record.channel_id] = offset
+            if chunk.indexes is None:
+                index.chunks[-1] = replace(chunk, indexes=indexes)
         case Message():
             last = index.chunks[-1] if index.chunks else None
             if last is not None and not last.is_chunk and end - last.offset <= RUN_BYTES:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections import OrderedDict, defaultdict
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -15,11 +16,12 @@ from mcap.records import Message as Written
 
 from cogmap.bus.codec import Envelope, decode
 from cogmap.errors import LogError
+from cogmap.files.bounds import MIB, Budget, most_unpacked
 from cogmap.recording.storage import format as layout
+from cogmap.recording.storage.chunks import RECORD_BYTES, DamageError
 from cogmap.recording.storage.format import EnvelopeRecord
 from cogmap.recording.storage.index import (
     ChunkSpan,
-    DamageError,
     channels_in,
     log_file,
     messages_in,
@@ -31,8 +33,10 @@ from cogmap.recording.storage.versions import check_readable
 from cogmap.schemas.base import Message
 from cogmap.schemas.topics import BY_NAME, Topic
 
-# Some 50 MB, since records are asked for roughly in order.
-_CACHED_CHUNKS = 12
+# Since records are asked for roughly in order.
+_CACHED_BYTES = 64 * MIB
+# What is read of a small log to be put in order, or into a table, may take so much.
+_HELD_BYTES = 256 * MIB
 _envelope_decoder = msgspec.msgpack.Decoder(EnvelopeRecord)
 _stub_decoder = msgspec.msgpack.Decoder(Message)
 Progress = Callable[[float], None]
@@ -87,7 +91,10 @@ class EnvelopeSearch:
     def __init__(self, chunks: Sequence[ChunkSpan], envelopes: frozenset[int]) -> None:
         self._envelopes = envelopes
         self._ends_ns = {end_ns for each in chunks for end_ns in (each.first_ns, each.last_ns)}
-        self._without = [each for each in chunks if not each.has_any(envelopes)]
+        without = [each for each in chunks if not each.has_any(envelopes)]
+        without.sort(key=lambda each: each.first_ns)
+        self._first_ns = [each.first_ns for each in without]
+        self._latest_ns = [*accumulate((each.last_ns for each in without), max)]
 
     def may_be_in(self, chunk: ChunkSpan) -> bool:
         """Return whether some of them may be in `chunk`."""
@@ -95,10 +102,10 @@ class EnvelopeSearch:
             return False
         if not self._ends_ns.isdisjoint((chunk.first_ns, chunk.last_ns)):
             return True
-        return any(
-            chunk.last_ns >= other.first_ns and chunk.first_ns <= other.last_ns
-            for other in self._without
-        )
+
+        # Of those that begin before it ends, does one end after it begins?
+        number = bisect_right(self._first_ns, chunk.last_ns)
+        return number > 0 and self._latest_ns[number - 1] >= chunk.first_ns
 
 
 class LogReader:
@@ -120,11 +127,13 @@ class LogReader:
         self._chunks = index.chunks
         self._indexed = {channel for each in index.chunks for channel in each.indexes or {}}
         self._cache: OrderedDict[int, list[Written]] = OrderedDict()
+        self._cached_bytes = 0
         check_readable(path, index.library, self.about(layout.RECORDING).get("software", ""))
 
     def forget(self) -> None:
         """Free the memory of what was read; it is read again when it is asked for."""
         self._cache.clear()
+        self._cached_bytes = 0
 
     def about(self, name: str) -> dict[str, str]:
         """Return the last metadata record called `name`, empty if there is none."""
@@ -163,12 +172,14 @@ class LogReader:
         share of chunks that have been read. Raises LogError.
         """
         waiting: list[_Located] = []
+        held = self._budget("holds, to be put in order,")
         numbers = self._numbers(topics, start_ns, end_ns)
         for done, number in enumerate(numbers, start=1):
             for position, message in enumerate(self._messages(number)):
                 if start_ns <= message.log_time < end_ns:
                     order = message.log_time, self._chunks[number].offset, position
                     waiting.append(_Located(order, number, position, message))
+            held.check(_size_of([each.message for each in waiting]))
             waiting.sort(key=_ORDER)
 
             # Chunks may overlap: what is as late as the next one's first message waits for it.
@@ -195,6 +206,7 @@ class LogReader:
         named = {topic.name: topic for topic in topics}
         channels = self._channels_of(set(named))
         found: dict[Topic, list[tuple[tuple[int, int, int], bytes]]] = {each: [] for each in topics}
+        held = self._budget("holds, of these topics,")
         with self.path.open("rb") as file:
             for number in self._numbers(topics, start_ns, end_ns):
                 offset = self._chunks[number].offset
@@ -202,6 +214,7 @@ class LogReader:
                 for position, message in enumerate(messages):
                     if start_ns <= message.log_time < end_ns:
                         order = message.log_time, offset, position
+                        held.take(RECORD_BYTES + len(message.data))
                         found[named[self._topic_name(message)]].append((order, message.data))
 
         payloads = {}
@@ -308,6 +321,9 @@ class LogReader:
         except DamageError as error:
             raise self._damaged(chunk, error) from None
 
+    def _budget(self, doing: str) -> Budget:
+        return Budget(self.path, doing, most_unpacked(self.size_bytes, _HELD_BYTES))
+
     def _damaged(self, chunk: ChunkSpan, error: DamageError) -> LogError:
         return LogError(
             f"{self.path}: the chunk at byte {chunk.offset} is damaged ({error}): "
@@ -337,9 +353,16 @@ class LogReader:
         self.channels |= channels_in(contents)
         messages = messages_in(contents)
         self._cache[number] = messages
-        if len(self._cache) > _CACHED_CHUNKS:
-            self._cache.popitem(last=False)
+        self._cached_bytes += _size_of(messages)
+        while self._cached_bytes > _CACHED_BYTES and len(self._cache) > 1:
+            _, oldest = self._cache.popitem(last=False)
+            self._cached_bytes -= _size_of(oldest)
         return messages
+
+
+def _size_of(messages: Sequence[Written]) -> int:
+    """Return how many bytes messages take."""
+    return sum(RECORD_BYTES + len(message.data) for message in messages)
 
 
 def _take(candidates: list[bytes], topic_name: str) -> Envelope | None:

@@ -19,13 +19,8 @@ from mcap.records import (
 from mcap.writer import CompressionType, Writer
 
 from cogmap.recording.storage import format as layout
-from cogmap.recording.storage.index import (
-    RUN_BYTES,
-    DamageError,
-    channels_in,
-    messages_in,
-    open_chunk,
-)
+from cogmap.recording.storage.chunks import DamageError, open_chunk
+from cogmap.recording.storage.index import RUN_BYTES, channels_in, messages_in
 from cogmap.recording.storage.reader import Progress
 from cogmap.recording.storage.resync import LogBytes, RecordSpan
 from cogmap.recording.storage.writer import UNBOUNDED, cannot_write, open_new
@@ -79,6 +74,7 @@ class _Rescue:
         self._last_chunk_lost = False
         self._run: list[McapRecord] = []
         self._run_bytes = 0
+        self._has_read_summary = False
 
     def run(self, progress: Progress | None) -> Recovery:
         """Copy all that can be read. The new log names the program that wrote the old one, which
@@ -173,7 +169,10 @@ class _Rescue:
         self._recovery.chunks += 1
 
     def _read_summary(self) -> None:
-        """Take channels and schemas from the file's end: what declared them is damaged."""
+        """Take channels and schemas from the file's end, once: what declared them is damaged."""
+        if self._has_read_summary:
+            return
+        self._has_read_summary = True
         for span in self._source.all_records(_ignore):
             record = self._parsed(span)
             if isinstance(record, Channel):

@@ -23,7 +23,8 @@ from mcap.records import Channel, Chunk, Header, McapRecord, Message, MessageInd
 from mcap.writer import MCAP0_MAGIC
 
 from cogmap.errors import LogError
-from cogmap.recording.storage.index import DamageError, check_magic, log_file
+from cogmap.recording.storage.chunks import DamageError
+from cogmap.recording.storage.index import check_magic, log_file
 
 _HEAD = struct.Struct("<BQ")
 _COMPRESSION = re.compile(rb"\x03\x00\x00\x00lz4|\x04\x00\x00\x00zstd")

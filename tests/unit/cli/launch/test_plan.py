@@ -272,3 +272,9 @@ def test_a_tour_is_of_the_town_that_is_chosen(town: str) -> None:
 
     assert sections["sim"]["town"] == town
     assert "goals" not in sections["workspace"] or not sections["workspace"]["goals"]
+
+
+@pytest.mark.parametrize("seed", ["x", -1, 2**70, [1]])
+def test_a_seed_that_is_none_is_named_before_a_town_is_made_of_it(seed: object) -> None:
+    with pytest.raises(ConfigError, match=r"sim\.seed"):
+        configured(Choices(), sim={"seed": seed})
