@@ -18,6 +18,7 @@ from rich.progress import Progress
 from torch import Tensor, nn
 from torch.nn import functional
 
+from cogmap.files.digests import write_digests
 from cogmap.geometry.arrays import Singles
 from cogmap.services.epam.recognition.crop import CHANNELS, SIDE_PX
 from cogmap.services.epam.recognition.objects import (
@@ -184,7 +185,9 @@ def train_on_renderings(
     found = calibrate(embeddings, log_odds, held_out, prototypes)
 
     encoded = msgspec.json.format(msgspec.json.encode(found.prototypes), indent=1)
-    out.with_suffix(".json").write_bytes(encoded + b"\n")
+    beside = out.with_suffix(".json")
+    beside.write_bytes(encoded + b"\n")
+    write_digests(beside)
     return found.metrics
 
 

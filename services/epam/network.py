@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cogmap.errors import ConfigError
+from cogmap.files.digests import read_checked
 from cogmap.geometry.arrays import Singles
 from cogmap.services.epam.config import Processor
 
@@ -41,8 +42,8 @@ class Network:
     shapes are given by name, run by `processor`. Where a shape has None the file may have any
     number, or leave it free.
 
-    Raises ConfigError if there is no such file or no such processor, or if its network has other
-    inputs or outputs.
+    Raises ConfigError if there is no such file or no such processor, if the file does not have the
+    digest that is beside it, or if its network has other inputs or outputs.
     """
 
     def __init__(
@@ -152,8 +153,7 @@ def provider_of(processor: Processor, installed: Collection[str]) -> str:
 
 
 def _session(path: Path, processor: Processor) -> onnxruntime.InferenceSession:
-    if not path.is_file():
-        raise ConfigError(f"no weights {path}: train them with cogmap train")
+    content = read_checked(path)
 
     # It starts a thread as it is imported, which a forked process would lack and wait for.
     import onnxruntime
@@ -165,7 +165,7 @@ def _session(path: Path, processor: Processor) -> onnxruntime.InferenceSession:
     provider_options = CUDA_OPTIONS if provider == CUDA_PROVIDER else {}
     try:
         session = onnxruntime.InferenceSession(
-            path, options, providers=[(provider, provider_options)]
+            content, options, providers=[(provider, provider_options)]
         )
     except Exception as error:  # the library raises an exception of its own for each status
         raise ConfigError(

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from cogmap.errors import UsageError
+from cogmap.files.digests import read_checked, write_digests
 
 OPSET = 13
 # Weights with more values than this are stored in half precision where a file is to be small.
@@ -25,8 +26,8 @@ def export(
     *,
     any_size: bool = False,
 ) -> None:
-    """Write `net` to `path`, as `cogmap.services.epam.network` reads it; with `any_size`, for
-    inputs (n, channels, h, w) of any height and width.
+    """Write `net` to `path`, and its digest beside it, as `cogmap.services.epam.network` reads it;
+    with `any_size`, for inputs (n, channels, h, w) of any height and width.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     free = {2: "height", 3: "width"}
@@ -40,11 +41,12 @@ def export(
         output_names=list(output_names),
         dynamic_axes={input_name: free} if any_size else None,
     )
+    write_digests(path)
 
 
 def adopt(net: nn.Module, path: Path) -> None:
     """Give `net` the weights of the network of its kind that `export` wrote to `path`, to train it
-    further. Raises UsageError if that has other layers.
+    further. Raises UsageError if that has other layers, ConfigError if it is not as it was written.
 
     What normalized the layers is part of these weights, so that the normalization of `net` does
     nothing from here on: it must stay in evaluation.
@@ -52,7 +54,7 @@ def adopt(net: nn.Module, path: Path) -> None:
     import onnx
     from onnx import numpy_helper
 
-    graph = onnx.load(path).graph
+    graph = onnx.load_from_string(read_checked(path)).graph
     values = {each.name: numpy_helper.to_array(each) for each in graph.initializer}
     stored = [
         [torch.tensor(values[name]) for name in node.input[1:]]
@@ -106,3 +108,4 @@ def halve(path: Path) -> None:
     del model.graph.node[:]
     model.graph.node.extend(nodes)
     onnx.save(model, path)
+    write_digests(path)

@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from cogmap.errors import ConfigError
+from cogmap.files.digests import read_checked
 from cogmap.geometry.arrays import Bytes, Floats, Singles
 from cogmap.schemas.array import Array
 from cogmap.schemas.sensing import Appearance as PublishedAppearance
@@ -216,8 +217,8 @@ def load(path: Path = DEFAULT_PATH, processor: Processor = "cpu") -> ObjectRecog
     network = Network(path, INPUT_SHAPE, OUTPUT_SHAPES, processor)
     beside = path.with_suffix(".json")
     try:
-        prototypes = msgspec.json.decode(beside.read_bytes(), type=Prototypes)
-    except (OSError, msgspec.DecodeError) as error:
+        prototypes = msgspec.json.decode(read_checked(beside), type=Prototypes)
+    except (msgspec.DecodeError, RecursionError) as error:
         raise ConfigError(
             f"{beside} does not hold the prototypes of {path.name} ({error}): "
             "train both again with cogmap train objects"

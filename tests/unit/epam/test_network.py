@@ -8,6 +8,7 @@ import onnxruntime
 import pytest
 
 from cogmap.errors import ConfigError
+from cogmap.files.digests import DIGESTS, read_checked, write_digests
 from cogmap.services.epam.config import Config
 from cogmap.services.epam.layout import road
 from cogmap.services.epam.module import CAMVID, build
@@ -16,6 +17,7 @@ from cogmap.services.epam.network import (
     CUDA_PROVIDER,
     FREE_AREA_PX,
     GPU_PROVIDERS,
+    WEIGHTS,
     Network,
     provider_of,
 )
@@ -74,3 +76,30 @@ def test_a_network_of_any_size_receives_views_in_about_their_proportions(
     assert size.width_px / size.height_px == pytest.approx(width / height, rel=0.15)
     assert size.width_px * size.height_px == pytest.approx(FREE_AREA_PX, rel=0.12)
     assert size.padding_px == 0
+
+
+BUNDLED = [*WEIGHTS.glob("*.onnx"), *CAMVID.glob("*.onnx")]
+
+
+@pytest.mark.parametrize("path", BUNDLED, ids=lambda path: f"{path.parent.name}-{path.stem}")
+def test_bundled_weights_of_which_a_bit_is_another_are_refused(path: Path, tmp_path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    changed = tmp_path / path.name
+    changed.write_bytes(content)
+    (tmp_path / DIGESTS).write_bytes((path.parent / DIGESTS).read_bytes())
+    assert read_checked(changed) == content
+
+    content[len(content) // 2] ^= 1
+    changed.write_bytes(content)
+    with pytest.raises(ConfigError, match=rf"{path.name} does not have its digest.*train it again"):
+        Network(changed, (1,), {})
+
+
+def test_weights_without_a_digest_are_refused_with_the_way_to_write_one(tmp_path: Path) -> None:
+    alone = tmp_path / "road.onnx"
+    alone.write_bytes(road.DEFAULT_PATH.read_bytes())
+    with pytest.raises(ConfigError, match=r"sha256sum road\.onnx >> SHA256SUMS"):
+        _road(alone)
+
+    write_digests(alone)
+    _road(alone)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from cogmap.errors import ConfigError
+from cogmap.files.digests import write_digests
 from cogmap.services.epam.network import Network
 from cogmap.services.epam.recognition.objects import DEFAULT_PATH as WEIGHTS
 from cogmap.services.epam.recognition.objects import (
@@ -141,8 +142,9 @@ def test_the_committed_prototypes_have_the_catalogues_names_and_sizes() -> None:
 def test_weights_without_their_prototypes_are_refused_with_the_remedy(tmp_path: Path) -> None:
     alone = tmp_path / "objects.onnx"
     alone.write_bytes(WEIGHTS.read_bytes())
+    write_digests(alone)
 
-    with pytest.raises(ConfigError, match=r"objects\.json.*cogmap train objects"):
+    with pytest.raises(ConfigError, match=r"no weights .*objects\.json: .*cogmap train"):
         load(alone)
     with pytest.raises(ConfigError, match=r"no weights .*nowhere\.onnx"):
         load(tmp_path / "nowhere.onnx")
@@ -156,5 +158,6 @@ def test_weights_of_another_shape_are_refused(tmp_path: Path) -> None:
 
     broken = tmp_path / "broken.onnx"
     broken.write_bytes(b"no network")
-    with pytest.raises(ConfigError, match=r"broken\.onnx"):
+    write_digests(broken)
+    with pytest.raises(ConfigError, match=r"broken\.onnx does not hold a network"):
         Network(broken, INPUT_SHAPE, OUTPUT_SHAPES)
