@@ -6,7 +6,7 @@ MEASURES := .venv/measures
 RERUN := .venv/rerun
 DOCUMENTS := .venv/documents
 
-.PHONY: help setup train-setup bench-setup rerun-setup demo test test-compose lint docs generated bench release clean
+.PHONY: help setup train-setup bench-setup rerun-setup demo test test-compose fuzz lint docs generated bench release clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -57,6 +57,9 @@ test: setup ## every test but those of the containers; those of training are ski
 
 test-compose: setup ## build the containers and test them as they run
 	$(BIN)/python -m pytest tests/compose -m compose --timeout 1200
+
+fuzz: setup ## coverage-guided fuzzing by atheris, where it is installed; make fuzz ARGS="--seconds 600 NAME"
+	$(BIN)/python -m tests.fuzz.targets $(ARGS)
 
 lint: setup ## style, types, and which package imports which; needs no torch
 	$(BIN)/ruff check .

@@ -21,6 +21,7 @@ from benchmarks.dashboard import measure as dashboard
 from benchmarks.explore import measure as explore
 from benchmarks.export import measure as export
 from benchmarks.faults import measure as faults
+from benchmarks.fuzz import measure as fuzz
 from benchmarks.individuals import measure as individuals
 from benchmarks.learning import measure as learning
 from benchmarks.lifelong import measure as lifelong
@@ -194,6 +195,7 @@ SUITE = (
         has_command=False,
     ),
     Benchmark("ablation", {}, paper.measure_ablation, has_command=False),
+    Benchmark("fuzz", fuzz.THRESHOLDS, fuzz.measure, options=fuzz.OPTIONS, in_all=False),
     Benchmark("constants", {}, constants.measure, options=constants.OPTIONS, in_all=False),
 )
 NAMES = tuple(benchmark.name for benchmark in SUITE)

@@ -15,6 +15,7 @@ import msgspec
 from cogmap.cli.launch.goals import name_of, nearest_label, routeless
 from cogmap.cli.options import json_option, wait_option
 from cogmap.errors import NoAnswerError, UsageError
+from cogmap.files.packed import read_text
 from cogmap.graph.graph import Graph
 from cogmap.runtime.client import Client
 from cogmap.runtime.module import Module
@@ -229,7 +230,11 @@ def read_goals(path: Path) -> list[Goal]:
     Raises UsageError for a wrong line, which it names, and if there is none.
     """
     goals = []
-    for number, line in enumerate(path.read_text("utf-8").splitlines(), start=1):
+    try:
+        lines = read_text(path).splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path} cannot be read ({error}): give goals, one a line") from None
+    for number, line in enumerate(lines, start=1):
         words = line.split()
         if not words:
             continue

@@ -105,5 +105,5 @@ def _decoded(decoder: msgspec.json.Decoder[T], line: bytes) -> T | None:
     """Decode what a line holds; None if it is damaged."""
     try:
         return decoder.decode(line)
-    except (msgspec.MsgspecError, UnicodeDecodeError):
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return None

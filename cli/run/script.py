@@ -202,5 +202,5 @@ def summary_in(folder: Path) -> RunMetrics | None:
 
     try:
         return msgspec.json.decode((folder / SUMMARY_NAME).read_bytes(), type=RunMetrics)
-    except (OSError, msgspec.DecodeError):
+    except (OSError, msgspec.DecodeError, RecursionError):
         return None

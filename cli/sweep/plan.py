@@ -133,7 +133,7 @@ def _known(path: Path) -> dict[str, Any]:
         return {}
     try:
         known = json.loads(path.read_bytes())
-    except ValueError:
+    except (ValueError, RecursionError):
         known = None
     if not isinstance(known, dict):
         raise UsageError(f"{path} is no plan of a sweep: name another folder with --out")

@@ -39,6 +39,6 @@ def _is_json(line: str) -> bool:
 
     try:
         msgspec.json.decode(line)
-    except msgspec.DecodeError:
+    except (msgspec.DecodeError, RecursionError):
         return False
     return True

@@ -55,11 +55,11 @@ def pattern(topic: Topic) -> str:
 
 def _read(text: str) -> Any:
     """Read JSON or YAML. JSON comes first: YAML reads 1e4 as a string."""
-    with contextlib.suppress(msgspec.DecodeError):
+    with contextlib.suppress(msgspec.DecodeError, RecursionError):
         return msgspec.json.decode(text)
     try:
         return yaml.safe_load(text)
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise UsageError(f"{text!r} is neither JSON nor YAML: {reason}") from None
 

@@ -93,5 +93,5 @@ def decode_envelope(data: bytes | memoryview | None) -> Envelope:
         raise MessageError("no envelope")
     try:
         return _envelope_decoder.decode(data)
-    except (msgspec.DecodeError, ValueError, OverflowError) as error:
+    except (msgspec.DecodeError, ValueError, OverflowError, RecursionError) as error:
         raise MessageError(f"envelope: {error}") from error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.text import Line, numbered_lines, plain_or_packed
+from cogmap.data.text import Line, cells_of, numbered_lines, plain_or_packed
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats
 
@@ -92,9 +91,8 @@ def _check_names(path: Path, lines: Iterator[Line], columns: Columns) -> None:
 
 def _row(line: Line, columns: Columns) -> list[float]:
     """Read the numbers of a line. Raises UsageError."""
-    (cells,) = csv.reader([line.text])
     try:
-        row = [float(cell) for cell in cells]
+        row = [float(cell) for cell in cells_of(line)]
     except ValueError:
         row = []
 

@@ -8,7 +8,6 @@ True poses of the body are in `mav0/state_groundtruth_estimate0`, if there are a
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from cogmap.data.camera_pair import Camera, RectifiedRecording, rectified
 from cogmap.data.stereo_recording import StereoRecording, checked_stamps
-from cogmap.data.text import Line, numbered_lines, read_bytes
+from cogmap.data.text import Line, cells_of, number_of, numbered_lines, read_bytes
 from cogmap.data.true_path import poses_at
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats, Indices
@@ -27,6 +26,7 @@ from cogmap.geometry.se2 import transform_to
 
 GIVE = "the folder of a EuRoC sequence, with mav0 in it"
 NS_PER_S = 1_000_000_000
+MAX_YAML_CHARACTERS = 20_000
 TRUTH = "a stamp in ns, a position and a quaternion w, x, y, z"
 MOUNT_HEIGHT_M = 1.0
 """The files do not say how high above the ground the cameras are: as high as a hand holds them."""
@@ -89,10 +89,15 @@ def _camera(folder: Path) -> Camera:
 def _yaml(path: Path) -> dict[str, Any]:
     """Read a mapping, without OpenCV's first line `%YAML:1.0`. Raises UsageError."""
     text = read_bytes(path, GIVE).decode("utf-8", "replace")
+    if len(text) > MAX_YAML_CHARACTERS or "&" in text:
+        raise UsageError(
+            f"{path} has more than {MAX_YAML_CHARACTERS} characters, or names parts by &: "
+            f"no calibration does, give {GIVE}"
+        )
     lines = [line for line in text.splitlines() if not line.startswith("%YAML")]
     try:
         read = yaml.safe_load("\n".join(lines))
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         words = " ".join(str(error).split())
         raise UsageError(f"{path} is no YAML ({words}): give {GIVE}") from None
     return read if isinstance(read, dict) else {}
@@ -113,17 +118,17 @@ def _rows(path: Path) -> Iterator[tuple[Line, list[str]]]:
     """Yield the lines of a data.csv, and their cells. Raises UsageError."""
     for line in numbered_lines(path, GIVE):
         if line.text.strip() and not line.text.startswith("#"):
-            (cells,) = csv.reader([line.text])
-            yield line, [cell.strip() for cell in cells]
+            yield line, [cell.strip() for cell in cells_of(line)]
 
 
 def _pictures(folder: Path) -> dict[int, Path]:
     """Return the pictures of a camera by their stamps, as they stand. Raises UsageError."""
     pictures = {}
     for line, cells in _rows(folder / "data.csv"):
-        if len(cells) < 2 or not cells[0].isdecimal() or not cells[1]:
+        stamp_ns = number_of(cells[0])
+        if len(cells) < 2 or stamp_ns is None or not cells[1] or "\0" in cells[1]:
             raise line.wrong("a stamp in ns and the name of a picture")
-        pictures[int(cells[0])] = folder / "data" / cells[1]
+        pictures[stamp_ns] = folder / "data" / cells[1]
     return pictures
 
 

@@ -6,7 +6,6 @@ order of the visit. Other columns are ignored.
 
 from __future__ import annotations
 
-import csv
 from collections import defaultdict
 from contextlib import suppress
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.text import Line, numbered_lines, plain_or_packed
+from cogmap.data.text import Line, cells_of, numbered_lines, plain_or_packed
 from cogmap.data.tsplib import Problem, read
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Indices
@@ -78,4 +77,4 @@ def read_folder(folder: Path) -> list[HumanTours]:
 
 
 def _values(line: Line) -> list[str]:
-    return next(csv.reader([line.text]), [])
+    return cells_of(line)

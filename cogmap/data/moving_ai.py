@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.text import Line, numbered_lines
+from cogmap.data.text import Line, number_of, numbered_lines
 from cogmap.errors import UsageError
-from cogmap.geometry.arrays import Booleans
+from cogmap.geometry.arrays import Booleans, Bytes
 
 PASSABLE = frozenset(".GS")
 KNOWN = PASSABLE | frozenset("@OTW")
@@ -49,8 +49,9 @@ def read_map(path: Path) -> Booleans:
             break
 
         key, value = words if len(words) == 2 else ("", "")
-        if key in ("width", "height") and value.isdecimal():
-            sizes[key] = int(value)
+        size = number_of(value)
+        if key in ("width", "height") and size is not None:
+            sizes[key] = size
         elif words != ["type", "octile"]:
             raise line.wrong(HEADER.get(key, f"{', '.join(HEADER.values())}, or map"))
 
@@ -60,24 +61,24 @@ def read_map(path: Path) -> Booleans:
     if not 0 < width * height <= MAX_CELLS:
         raise UsageError(f"{path} has {width} x {height} cells: give a map of 1 to {MAX_CELLS}")
 
-    is_passable = np.zeros((width, height), bool)
-    rows = 0
+    # Rows that are there, not those that the head promises.
+    rows: list[Bytes] = []
 
     for line in lines:
         cells = line.text.rstrip()
-        if rows == height:
+        if len(rows) == height:
             if cells:
                 raise line.wrong(f"the end after {height} rows", "make height their number")
             continue
         if len(cells) != width or not KNOWN.issuperset(cells):
             raise line.wrong(f"{width} cells out of . G S @ O T W", "mend the row, or width")
 
-        is_passable[:, rows] = [cell in PASSABLE for cell in cells]
-        rows += 1
+        rows.append(np.frombuffer(cells.encode(), np.uint8))
 
-    if rows < height:
-        raise UsageError(f"{path} ends before row {rows + 1} of {height}: give all of it")
-    return is_passable
+    if len(rows) < height:
+        raise UsageError(f"{path} ends before row {len(rows) + 1} of {height}: give all of it")
+    passable = np.frombuffer("".join(PASSABLE).encode(), np.uint8)
+    return np.isin(np.stack(rows, axis=1), passable)
 
 
 def read_problems(path: Path, is_passable: Booleans) -> list[Problem]:

@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 
 from cogmap.errors import UsageError
+from cogmap.files.bounds import MIB, Budget, most_unpacked
 from cogmap.geometry.arrays import Floats
 
 GIVE = "an NWB file (.nwb, HDF5) with positions and the spike times of units"
+ARRAY_BYTES = 256 * MIB
 BEHAVIOR = "behavior"
 EVENTS = "events"
 RESTS = "rests"
@@ -53,15 +55,16 @@ def read(
 
     with _whole(path), pynwb.NWBHDF5IO(str(path), mode="r", load_namespaces=True) as file:
         nwb = file.read()
-        stamps_s, positions_m = _positions(nwb, path, position)
+        budget = Budget(path, "has arrays of", most_unpacked(path.stat().st_size, ARRAY_BYTES))
+        stamps_s, positions_m = _positions(nwb, path, position, budget)
         return Recording(
             name=path.name,
             description=str(nwb.session_description),
             stamps_s=stamps_s,
             positions_m=positions_m,
-            spikes_s=_spikes(nwb, path),
-            events_s=None if events is None else _intervals(nwb, path, events, "--events"),
-            rests_s=None if rests is None else _intervals(nwb, path, rests, "--rests"),
+            spikes_s=_spikes(nwb, path, budget),
+            events_s=None if events is None else _intervals(nwb, path, events, "--events", budget),
+            rests_s=None if rests is None else _intervals(nwb, path, rests, "--rests", budget),
         )
 
 
@@ -107,7 +110,7 @@ def write(recording: Recording, path: Path) -> None:
         ) from None
 
 
-def _positions(nwb: Any, path: Path, name: str | None) -> tuple[Floats, Floats]:
+def _positions(nwb: Any, path: Path, name: str | None, budget: Budget) -> tuple[Floats, Floats]:
     """Return the stamps (n,) and positions (n, 2) of one SpatialSeries, those that are known."""
     series = _spatial_series(nwb)
     given = ", ".join(series) or "none"
@@ -126,7 +129,7 @@ def _positions(nwb: Any, path: Path, name: str | None) -> tuple[Floats, Floats]:
             f"{path}: the unit of {name} is {chosen.unit}, which is no length: convert it to meters"
         )
 
-    data = np.asarray(chosen.data[:], float)
+    data = _array(chosen.data, budget)
     if data.ndim == 1:
         data = data[:, None]
     scale = METRES[unit]
@@ -134,7 +137,7 @@ def _positions(nwb: Any, path: Path, name: str | None) -> tuple[Floats, Floats]:
     columns = min(2, data.shape[1])
     known_m[:, :columns] = (data[:, :columns] * chosen.conversion + chosen.offset) * scale
     if chosen.timestamps is not None:
-        stamps_s = np.asarray(chosen.timestamps[:], float)
+        stamps_s = _array(chosen.timestamps, budget)
     else:
         stamps_s = float(chosen.starting_time or 0.0) + np.arange(len(data)) / float(chosen.rate)
 
@@ -157,14 +160,24 @@ def _spatial_series(nwb: Any) -> dict[str, Any]:
     return found
 
 
-def _spikes(nwb: Any, path: Path) -> list[Floats]:
+def _array(written: Any, budget: Budget) -> Floats:
+    """Return the numbers of a data set, of which a few bytes may promise any number."""
+    budget.take(8 * int(np.prod(np.shape(written), dtype=object)))
+    return np.asarray(written[:], float)
+
+
+def _spikes(nwb: Any, path: Path, budget: Budget) -> list[Floats]:
     if nwb.units is None or "spike_times" not in nwb.units.colnames:
         raise UsageError(f"{path} has no units with spike times: give {GIVE}")
     times = nwb.units["spike_times"]
-    return [np.sort(np.asarray(times[row], float)) for row in range(len(nwb.units))]
+    spikes_s = []
+    for row in range(len(nwb.units)):
+        spikes_s.append(np.sort(np.asarray(times[row], float)))
+        budget.take(spikes_s[-1].nbytes)
+    return spikes_s
 
 
-def _intervals(nwb: Any, path: Path, name: str, option: str) -> Floats:
+def _intervals(nwb: Any, path: Path, name: str, option: str, budget: Budget) -> Floats:
     """Return the beginnings and ends (k, 2) of a table of intervals."""
     tables = dict(nwb.intervals or {})
     for module in nwb.processing.values():
@@ -176,8 +189,9 @@ def _intervals(nwb: Any, path: Path, name: str, option: str) -> Floats:
         raise UsageError(f"{option} {name}: {path} has no such table of intervals; it has {given}")
 
     table = tables[name]
-    spans_s = np.column_stack([table["start_time"][:], table["stop_time"][:]])
-    return spans_s[np.argsort(spans_s[:, 0])].astype(float)
+    ends_s = [_array(table[column].data, budget) for column in ("start_time", "stop_time")]
+    spans_s = np.column_stack(ends_s)
+    return spans_s[np.argsort(spans_s[:, 0])]
 
 
 @contextmanager

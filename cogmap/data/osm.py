@@ -4,6 +4,7 @@ packed, and PBF as Geofabrik distributes it.
 
 from __future__ import annotations
 
+from collections import defaultdict, deque
 from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import groupby
@@ -18,6 +19,7 @@ from osmium.osm import Way as ReadWay
 
 from cogmap.data.text import PACKED, read_bytes
 from cogmap.errors import UsageError
+from cogmap.files.bounds import Budget
 from cogmap.geometry.geographic import continuous
 
 SUFFIXES = (*(f".osm{packed}" for packed in PACKED), ".osm.pbf")
@@ -29,6 +31,10 @@ _FOREIGN = {
     b"<!doctype html": "it is a web page such as a server's error, download the extract again",
 }
 Tags = dict[str, str]
+# What an element takes in memory as it is read, what each of its tags, and each node of a way.
+ELEMENT_BYTES = 600
+TAG_BYTES = 300
+REFERENCE_BYTES = 100
 
 
 @dataclass
@@ -107,6 +113,7 @@ class _Elements:
         self.buildings: dict[int, _Multipolygon] = {}
         self.path = path
         self._versions: dict[str, dict[int, int]] = {"n": {}, "w": {}, "r": {}}
+        self._budget = Budget(path, "takes")
 
     def enter(self, element: Node | ReadWay | Relation) -> None:
         """Enter an element in the place of an older version. Raises UsageError if it is wrong."""
@@ -115,6 +122,7 @@ class _Elements:
         if element.version < versions.get(element.id, 0):
             return
         versions[element.id] = element.version
+        self._budget.take(ELEMENT_BYTES + TAG_BYTES * len(element.tags))
         if element.deleted:
             self.remove(kind, element.id)
         elif isinstance(element, Node):
@@ -127,6 +135,7 @@ class _Elements:
             if tags := dict(element.tags):
                 self.node_tags[element.id] = tags
         elif isinstance(element, ReadWay):
+            self._budget.take(REFERENCE_BYTES * len(element.nodes))
             nodes = [node.ref for node in element.nodes]
             if 0 in nodes:
                 raise UsageError(
@@ -138,6 +147,7 @@ class _Elements:
                     self.nodes.setdefault(node.ref, (node.lon, node.lat))
             self.ways[element.id] = Way(element.id, nodes, dict(element.tags))
         elif element.tags.get("type") == "multipolygon" and "building" in element.tags:
+            self._budget.take(REFERENCE_BYTES * len(element.members))
             members = [each for each in element.members if each.type == "w"]
             outer = [each.ref for each in members if each.role != "inner"]
             self.buildings[element.id] = _Multipolygon(element.id, outer, dict(element.tags))
@@ -190,15 +200,28 @@ class _Multipolygon:
 
         members = [way_of[way] for way in self.ways]
         lines = [way.nodes for way in members if len(way.nodes) > 1 and "building" not in way.tags]
+        ending_at: dict[int, deque[int]] = defaultdict(deque)
+        for number, line in enumerate(lines):
+            for end in (line[0], line[-1]):
+                ending_at[end].append(number)
+
+        taken: set[int] = set()
         rings = []
-        while lines:
-            ring = list(lines.pop(0))
+        for number, line in enumerate(lines):
+            if number in taken:
+                continue
+            taken.add(number)
+            ring = list(line)
             while ring[0] != ring[-1]:
-                following = next((line for line in lines if ring[-1] in (line[0], line[-1])), None)
-                if following is None:
+                candidates = ending_at[ring[-1]]
+                while candidates and candidates[0] in taken:
+                    candidates.popleft()
+                if not candidates:
                     return []
 
-                lines.remove(following)
+                found = candidates.popleft()
+                taken.add(found)
+                following = lines[found]
                 onward = following if following[0] == ring[-1] else following[::-1]
                 ring.extend(onward[1:])
             rings.append(Way(self.id, ring, self.tags))

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-import cv2
 import numpy as np
 
 from cogmap.data.text import read_bytes
 from cogmap.errors import UsageError
+from cogmap.files.pictures import decoded
 from cogmap.geometry.arrays import Bytes, Floats, Indices
 from cogmap.schemas.sensing import Calibration
 
@@ -81,15 +81,10 @@ def picture(path: Path) -> Bytes:
     missing or broken.
     """
     content = np.frombuffer(read_bytes(path, GIVE), np.uint8)
-    try:
-        image = cv2.imdecode(content, cv2.IMREAD_ANYCOLOR) if content.size else None
-    except cv2.error:
-        image = None
+    image = decoded(content, str(path))
     if image is None:
         raise UsageError(f"{path} is no whole picture: {REMEDY}")
-    if image.ndim == 3:
-        image = cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
-    return image.astype(np.uint8, copy=False)
+    return image
 
 
 def pair_size_px(pairs: Iterable[tuple[Path, Path]], folder: Path, give: str) -> tuple[int, int]:

@@ -13,11 +13,14 @@ from typing import Annotated, Any
 import msgspec
 
 from cogmap.data.text import PACKED, numbered_lines
+from cogmap.files.bounds import Budget
 
 SUFFIXES = tuple(f".jsonl{packed}" for packed in PACKED)
 Lon = Annotated[float, msgspec.Meta(ge=-180, le=180)]
 Lat = Annotated[float, msgspec.Meta(ge=-90, le=90)]
 _POLYLINE = 5
+# A list or a number of JSON takes at most so much memory.
+_PART_BYTES = 80
 
 
 class StreetGraph(msgspec.Struct):
@@ -56,12 +59,14 @@ class StreetGraph(msgspec.Struct):
 def read(path: Path) -> list[StreetGraph]:
     """Read every city in a file. Raises UsageError naming file, line and what was expected."""
     graphs = []
+    budget = Budget(path, "takes")
     for line in numbered_lines(path, "street graphs as JSON Lines"):
         if not line.text.strip():
             continue
+        budget.check(sum(line.text.count(mark) for mark in "[{,") * _PART_BYTES)
         try:
             graph = msgspec.json.decode(line.text, type=StreetGraph)
-        except (msgspec.DecodeError, msgspec.ValidationError) as error:
+        except (msgspec.DecodeError, UnicodeEncodeError, RecursionError) as error:
             raise line.wrong(f"a street graph ({error})") from None
 
         if not graph.edges:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import codecs
+import csv
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,6 +14,8 @@ from cogmap.files.packed import DAMAGE, SUFFIXES, opened
 
 PACKED = SUFFIXES
 MAX_SHOWN = 60
+MAX_DIGITS = 30
+MAX_NUMBER = 1 << 63
 
 
 class Line(NamedTuple):
@@ -46,6 +49,22 @@ def numbered_lines(path: Path, give: str) -> Iterator[Line]:
             except UnicodeDecodeError:
                 text = content.decode("latin-1")
             yield Line(path, number, text.rstrip("\r\n"))
+
+
+def cells_of(line: Line) -> list[str]:
+    """Return the cells of a line of CSV. Raises UsageError if it is none."""
+    try:
+        return next(csv.reader([line.text]), [])
+    except csv.Error as error:
+        raise line.wrong(f"cells that commas part ({error})") from None
+
+
+def number_of(word: str) -> int | None:
+    """Return the whole number of at most 63 bits that a word is; None if it is none."""
+    if not word.isdecimal() or len(word) > MAX_DIGITS:
+        return None
+    number = int(word)
+    return number if number < MAX_NUMBER else None
 
 
 def read_bytes(path: Path, give: str) -> bytes:

@@ -15,8 +15,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.text import PACKED, Line, numbered_lines, plain_or_packed
+from cogmap.data.text import PACKED, Line, number_of, numbered_lines, plain_or_packed
 from cogmap.errors import UsageError
+from cogmap.files.bounds import Budget
 from cogmap.geometry.arrays import Floats, Indices
 
 EUC_2D = "EUC_2D"
@@ -43,6 +44,8 @@ _KEY = re.compile(r"\s*([A-Za-z]\w*)\s*(:?)\s*(.*)")
 # TSPLIB's own value of pi: with another one, some lengths come out one kilometre different.
 _GEO_PI = 3.141592
 _GEO_RADIUS_KM = 6378.388
+# What the length between two nodes takes while lengths are computed.
+_LENGTH_BYTES = 48
 log = logging.getLogger("cogmap")
 
 
@@ -125,9 +128,10 @@ class _File:
             raise UsageError(f"{self.path} has no line {_DIMENSION}: give a whole TSPLIB file")
 
         line, value = self.values[_DIMENSION]
-        if not value.isdecimal() or int(value) < 1:
+        dimension = number_of(value)
+        if not dimension:
             raise line.wrong("a number of nodes, 1 at least")
-        return int(value)
+        return dimension
 
 
 def read(path: Path) -> Problem:
@@ -160,6 +164,7 @@ def read(path: Path) -> Problem:
     if len(rows) != file.dimension():
         line, _ = file.values[_DIMENSION]
         raise line.wrong(f"{len(rows)}, the number of nodes in the file")
+    Budget(path, "takes, with the lengths between its nodes,").check(_LENGTH_BYTES * len(rows) ** 2)
     return Problem(stem(path), weight_type, np.array(rows))
 
 
@@ -179,7 +184,7 @@ def read_tour(path: Path) -> Indices:
     visited: dict[int, None] = {}
 
     for line, word in words:
-        node = int(word) if word.isdecimal() else 0
+        node = number_of(word) or 0
         if not 1 <= node <= dimension or node in visited:
             raise line.wrong(f"a node from 1 to {dimension} that was not visited before")
         visited[node] = None

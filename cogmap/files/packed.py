@@ -15,6 +15,7 @@ from typing import IO, Any, cast
 
 import numpy as np
 
+from cogmap.errors import UsageError
 from cogmap.files.bounds import Budget, most_bytes, most_unpacked
 
 SUFFIXES = ("", ".gz", ".bz2", ".xz")
@@ -50,6 +51,11 @@ class _Bounded(io.RawIOBase):
         return len(content)
 
 
+def bounded(file: IO[bytes], budget: Budget) -> IO[bytes]:
+    """Return the same file, of which as much can be read as a budget has."""
+    return cast("IO[bytes]", io.BufferedReader(_Bounded(file, budget), BLOCK_BYTES))
+
+
 @contextmanager
 def opened(path: Path) -> Iterator[IO[bytes]]:
     """Open a file, unpacked. Reading raises BoundError, and one of DAMAGE."""
@@ -62,19 +68,18 @@ def opened(path: Path) -> Iterator[IO[bytes]]:
     else:
         budget = Budget(path, "unpacks to", most_unpacked(path.stat().st_size))
     with cast("IO[bytes]", opener(path) if opener else path.open("rb")) as file:
-        yield io.BufferedReader(_Bounded(file, budget), BLOCK_BYTES)
+        yield bounded(file, budget)
 
 
 def read_text(path: Path) -> str:
     """Return the text of a plain file in UTF-8. Raises BoundError, OSError, UnicodeDecodeError."""
     with path.open("rb") as file:
-        budget = Budget(path, "holds")
-        return io.BufferedReader(_Bounded(file, budget), BLOCK_BYTES).read().decode()
+        return bounded(file, Budget(path, "holds")).read().decode()
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray[Any, Any]]:
-    """Return the arrays of a .npz file by their names. Raises BoundError, OSError, ValueError; of
-    Python's objects there are none.
+    """Return the arrays of a .npz file by their names, none of Python's objects. Raises UsageError
+    if they cannot be read.
     """
     try:
         with zipfile.ZipFile(path) as packed:
@@ -83,5 +88,8 @@ def read_arrays(path: Path) -> dict[str, np.ndarray[Any, Any]]:
             )
         with np.load(path, allow_pickle=False) as stored:
             return {name: stored[name] for name in stored.files}
-    except (zipfile.BadZipFile, zlib.error, EOFError, MemoryError, NotImplementedError) as error:
-        raise ValueError(str(error)) from None
+    except UsageError:
+        raise
+    except Exception as error:  # zip, zlib and NumPy raise what the nonsense in a file leads to
+        words = " ".join(str(error).split()) or type(error).__name__
+        raise UsageError(f"{path} holds no arrays ({words}): make it again") from None

@@ -269,7 +269,7 @@ def recorded_config(reader: LogReader) -> dict[str, dict[str, Any]]:
     """
     try:
         sections = json.loads(reader.about(layout.RECORDING).get("config", "{}"))
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise LogError(
             f"{reader.path} holds a configuration that cannot be read: {error}"
         ) from None

@@ -70,5 +70,5 @@ def _read(path: Path) -> Traversal:
         if OUTCOME in arrays:
             outcome = msgspec.json.decode(str(arrays.pop(OUTCOME)), type=Outcome)
         return Traversal(alone_m=alone_m, outcome=outcome, **arrays)
-    except (OSError, ValueError, TypeError, msgspec.DecodeError) as error:
+    except (UsageError, TypeError, msgspec.DecodeError) as error:
         raise UsageError(f"{path} is damaged ({error}): remove it, and it is made anew") from None

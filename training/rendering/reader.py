@@ -48,7 +48,7 @@ def read(path: Path) -> Town:
         arrays: dict[str, Any] = {key: stored[key] for key in ARRAYS}
         names = tuple(str(name) for name in stored["names"])
         return Town(**arrays, names=names, calibration=calibration)
-    except (OSError, ValueError, KeyError, msgspec.DecodeError) as error:
+    except (UsageError, KeyError, msgspec.DecodeError) as error:
         raise UsageError(
             f"{path} holds no renderings ({error}): write them with cogmap train render"
         ) from None

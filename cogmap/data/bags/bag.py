@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from cogmap.data.bags import unpacking
 from cogmap.data.bags.order import stamp_ns_of
 from cogmap.errors import UsageError
 
@@ -31,6 +32,7 @@ class Bag:
         self.path = path
         if not path.exists():
             raise UsageError(f"there is no file or folder {path}: give {GIVE}")
+        unpacking.check_databases(path)
         with self._whole():
             self._reader = any_reader([path], default_typestore=store)
             self._reader.open()
@@ -109,9 +111,13 @@ def _library() -> tuple[Any, Any]:
     """Return the reader of rosbags, and the types of bags that do not describe theirs."""
     try:
         from rosbags.highlevel import AnyReader
+        from rosbags.rosbag1 import reader as reader1
+        from rosbags.rosbag2 import reader as reader2
+        from rosbags.rosbag2 import storage_mcap
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise UsageError(
             "bags need the library rosbags: install it by `pip install 'cogmap[bags]'`"
         ) from None
+    unpacking.bound(reader1, reader2, storage_mcap)
     return AnyReader, get_typestore(Stores.LATEST)

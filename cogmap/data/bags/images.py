@@ -8,6 +8,7 @@ import cv2
 import numpy as np
 
 from cogmap.errors import UsageError
+from cogmap.files.pictures import decoded
 from cogmap.geometry.arrays import Bytes
 
 REMEDY = "send or record it again, or cut this part of the bag off"
@@ -52,13 +53,10 @@ def image_of(message: Any, name: str) -> Bytes:
 
 
 def _unpacked(message: Any, name: str) -> Any:
-    try:
-        image = cv2.imdecode(message.data, cv2.IMREAD_ANYCOLOR) if len(message.data) else None
-    except cv2.error:
-        image = None
+    image = decoded(np.asarray(message.data, np.uint8), name)
     if image is None:
         raise UsageError(f"{name} cannot be decoded as {message.format or 'an image'}: {REMEDY}")
-    return image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2RGB)
+    return image
 
 
 def _raw(message: Any, name: str) -> Any:

@@ -22,8 +22,10 @@ MESSAGE_HEADER = struct.Struct("<BQHIQQ")
 CHUNK_BYTES = 128 * MIB
 """Every chunk may unpack to this, twice our largest message, and its records may take as much."""
 
-RECORD_BYTES = 400
-"""What a record takes in memory, besides its content."""
+RECORD_BYTES = 1200
+"""What a record of a chunk counts for, besides its content: three times its memory, as reading it
+takes time, too.
+"""
 
 
 class DamageError(Exception):
@@ -104,15 +106,8 @@ def _decompressed(chunk: Chunk, most: int) -> bytes:
 
 def _records(contents: bytes, budget: Budget) -> list[McapRecord]:
     found: list[McapRecord] = []
-    place = 0
-    while place < len(contents):
-        opcode, length = RECORD_HEADER.unpack_from(contents, place)
+    for opcode, place, end in _spans(contents, budget):
         start = place + RECORD_HEADER.size
-        end = start + length
-        if end > len(contents):
-            raise DamageError(f"the record at {place} in it was cut off")
-
-        budget.take(RECORD_BYTES + length)
         if opcode == Opcode.MESSAGE:
             _, _, channel, sequence, log_time_ns, sent_ns = MESSAGE_HEADER.unpack_from(
                 contents, place
@@ -122,5 +117,22 @@ def _records(contents: bytes, budget: Budget) -> list[McapRecord]:
         elif opcode in (Opcode.CHANNEL, Opcode.SCHEMA):
             kind = Channel if opcode == Opcode.CHANNEL else Schema
             found.append(kind.read(ReadDataStream(BytesIO(contents[start:end]))))
-        place = end
     return found
+
+
+def _spans(contents: bytes, budget: Budget) -> list[tuple[int, int, int]]:
+    """Return the opcode of each record, where it begins and ends. Raises BoundError before any of
+    them is read.
+    """
+    spans = []
+    place = 0
+    while place < len(contents):
+        opcode, length = RECORD_HEADER.unpack_from(contents, place)
+        end = place + RECORD_HEADER.size + length
+        if end > len(contents):
+            raise DamageError(f"the record at {place} in it was cut off")
+
+        budget.take(RECORD_BYTES + length)
+        spans.append((opcode, place, end))
+        place = end
+    return spans

@@ -18,7 +18,7 @@ from cogmap.bus.codec import Envelope, decode
 from cogmap.errors import LogError
 from cogmap.files.bounds import MIB, Budget, most_unpacked
 from cogmap.recording.storage import format as layout
-from cogmap.recording.storage.chunks import RECORD_BYTES, DamageError
+from cogmap.recording.storage.chunks import DamageError
 from cogmap.recording.storage.format import EnvelopeRecord
 from cogmap.recording.storage.index import (
     ChunkSpan,
@@ -37,6 +37,8 @@ from cogmap.schemas.topics import BY_NAME, Topic
 _CACHED_BYTES = 64 * MIB
 # What is read of a small log to be put in order, or into a table, may take so much.
 _HELD_BYTES = 256 * MIB
+# A message takes so much, besides its content.
+_MESSAGE_BYTES = 400
 _envelope_decoder = msgspec.msgpack.Decoder(EnvelopeRecord)
 _stub_decoder = msgspec.msgpack.Decoder(Message)
 Progress = Callable[[float], None]
@@ -214,7 +216,7 @@ class LogReader:
                 for position, message in enumerate(messages):
                     if start_ns <= message.log_time < end_ns:
                         order = message.log_time, offset, position
-                        held.take(RECORD_BYTES + len(message.data))
+                        held.take(_MESSAGE_BYTES + len(message.data))
                         found[named[self._topic_name(message)]].append((order, message.data))
 
         payloads = {}
@@ -362,7 +364,7 @@ class LogReader:
 
 def _size_of(messages: Sequence[Written]) -> int:
     """Return how many bytes messages take."""
-    return sum(RECORD_BYTES + len(message.data) for message in messages)
+    return sum(_MESSAGE_BYTES + len(message.data) for message in messages)
 
 
 def _take(candidates: list[bytes], topic_name: str) -> Envelope | None:

@@ -18,6 +18,8 @@ from cogmap.schemas.base import Message
 HEAD = struct.Struct("<IIH")
 COMPACT_BYTES = 8 * 2**20
 """To read and apply so much takes a workspace a quarter of a second when it is restarted."""
+# No topic has larger messages.
+MAX_BODY_BYTES = 2 * max(topic.max_bytes for topic in topics.ALL)
 
 
 class Journal:
@@ -60,6 +62,8 @@ class Journal:
             return None
 
         length, checksum, name_length = HEAD.unpack(head)
+        if length > MAX_BODY_BYTES:
+            return None
         body = os.pread(self._file, length, offset + HEAD.size)
         if len(body) < length or zlib.crc32(body) != checksum:
             return None

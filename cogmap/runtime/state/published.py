@@ -19,6 +19,7 @@ SUFFIX = ".published"
 # The name of a topic, padded with zeros, and the count.
 RECORD = struct.Struct("<120sQ")
 COUNT = struct.Struct("<Q")
+MAX_TOPICS = 10_000
 
 
 @dataclass
@@ -45,6 +46,8 @@ class PublishedCounts:
                 raise StorageError(
                     f"{path} is damaged: move it away to count from the beginning"
                 ) from None
+            if name in self._slots or len(self._slots) == MAX_TOPICS:
+                raise StorageError(f"{path} is damaged: move it away to count from the beginning")
             self._slots[name] = _Slot(self._size, count)
 
         self._earlier = {name: slot.count for name, slot in self._slots.items()}

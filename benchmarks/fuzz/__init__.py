@@ -1,0 +1,1 @@
+"""Messages and files changed at random, through every decoder, every handler and every reader."""

@@ -1,0 +1,63 @@
+"""Mutated files of every format, and crafted ones, through every reader."""
+
+from __future__ import annotations
+
+import gc
+import logging
+import random
+import shutil
+import time
+from pathlib import Path
+
+from benchmarks.fuzz.bombs import bombs
+from benchmarks.fuzz.mutations import changed
+from benchmarks.fuzz.readers import Format, formats
+from benchmarks.fuzz.samples import Files
+from benchmarks.fuzz.watch import Findings, rss_mb
+
+
+def campaign(seed: str, count: int, until_s: float, folder: Path) -> Findings:
+    """Read `count` mutated files, or as many as there is time for up to the monotonic `until_s`,
+    formats in turn, after every crafted file once.
+    """
+    logging.disable(logging.CRITICAL)
+    findings = Findings()
+    rng = random.Random(f"files {seed}")
+    table = [*formats().values()]
+    wholes = [(each, each.sample()) for each in table]
+    for form, files in wholes:
+        read(form, files, folder, Findings())
+
+    for form, files in bombs():
+        read(form, files, folder, findings)
+    gc.collect()
+    baseline_mb = rss_mb()
+    for number in range(count):
+        if time.monotonic() > until_s:
+            break
+        form, files = wholes[number % len(wholes)]
+        read(form, mutated(files, rng), folder, findings)
+
+    gc.collect()
+    findings.growth_mb = max(0.0, rss_mb() - baseline_mb)
+    return findings
+
+
+def mutated(files: Files, rng: random.Random) -> Files:
+    """Return files of which one is another, or is missing."""
+    name = rng.choice(sorted(files))
+    other = files[rng.choice(sorted(files))]
+    if rng.random() < 0.01:
+        return {each: content for each, content in files.items() if each != name}
+    return {**files, name: changed(files[name], rng, other)}
+
+
+def read(form: Format, files: Files, folder: Path, findings: Findings) -> None:
+    """Write files into a new folder, and read them as the format's reader does."""
+    place = folder / "read"
+    shutil.rmtree(place, ignore_errors=True)
+    for name, content in files.items():
+        path = place / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+    findings.watch_memory(form.name, lambda: form.read(place / form.file))
