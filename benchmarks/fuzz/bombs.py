@@ -21,7 +21,7 @@ from benchmarks.fuzz.readers import Format, formats
 from benchmarks.fuzz.samples import Files
 from cogmap.recording.storage.format import SOFTWARE
 
-UNPACKED_BYTES = 600 << 20
+UNPACKED_BYTES = 200 << 20
 TEXT_BYTES = 20 << 20
 NODE = b'<node id="1" lat="48.4" lon="15.6"/>'
 
@@ -44,11 +44,11 @@ def bombs() -> Iterator[tuple[Format, Files]]:
         for claimed in (UNPACKED_BYTES, 64):
             for name in ("log", "log, recovered"):
                 yield table[name], {"a.mcap": chunked(compression, content, claimed)}
-    small = messages_of_nothing(3_000_000)
+    small = messages_of_nothing(600_000)
     for name in ("log", "log, recovered"):
         yield table[name], {"a.mcap": chunked("zstd", zstandard.compress(small), len(small))}
 
-    large = np.zeros((30_000, 30_000), np.uint8)
+    large = np.zeros((8_000, 8_000), np.uint8)
     yield table["picture.png"], {"a.png": cv2.imencode(".png", large)[1].tobytes()}
     del large
     for text in (

@@ -47,7 +47,7 @@ def mutated(files: Files, rng: random.Random) -> Files:
     """Return files of which one is another, or is missing."""
     name = rng.choice(sorted(files))
     other = files[rng.choice(sorted(files))]
-    if rng.random() < 0.01:
+    if len(files) > 1 and rng.random() < 0.01:
         return {each: content for each, content in files.items() if each != name}
     return {**files, name: changed(files[name], rng, other)}
 

@@ -83,7 +83,7 @@ def campaign(seed: str, count: int, until_s: float) -> Findings:
 
 def _thrown(findings: Findings, seed: str, count: int, until_s: float) -> Findings:
     hail = Hail(seed)
-    baseline_mb = 0.0
+    baseline_mb = rss_mb()
     while findings.tried < count and time.monotonic() < until_s:
         with modules() as runner:
             for _ in range(min(ANEW_AFTER, count - findings.tried)):
