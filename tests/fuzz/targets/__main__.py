@@ -8,8 +8,6 @@ import sys
 from importlib.util import find_spec
 from pathlib import Path
 
-from tests.fuzz.targets.table import targets
-
 MISSING = (
     "coverage-guided fuzzing needs atheris, which is not installed: install it by "
     "`pip install atheris`, or run `python -m benchmarks fuzz`, which needs nothing"
@@ -21,6 +19,8 @@ MEMORY_MB = 2048
 
 def written(name: str, folder: Path) -> Path:
     """Write the corpus of a target into a folder of its name, beside what atheris has found."""
+    from tests.fuzz.targets.table import targets
+
     corpus = folder / name
     corpus.mkdir(parents=True, exist_ok=True)
     for number, content in enumerate(targets()[name].corpus()):
@@ -28,19 +28,21 @@ def written(name: str, folder: Path) -> Path:
     return corpus
 
 
-def run(name: str, corpus: Path, seconds: int) -> None:
-    """Run one target in this process, which atheris ends."""
+def run(name: str, folder: Path, seconds: int) -> None:
+    """Run one target in this process, which atheris ends. What it is to follow is imported here."""
     import atheris
 
     with atheris.instrument_imports(include=["cogmap", "mcap", "rosbags"]):
-        target = targets()[name]
+        from tests.fuzz.targets.table import targets
 
+    target = targets()[name]
+    corpus = written(name, folder)
     options = [
         f"-max_total_time={seconds}",
         f"-max_len={MAX_BYTES}",
         f"-timeout={HANG_S}",
         f"-rss_limit_mb={MEMORY_MB}",
-        f"-artifact_prefix={corpus.parent}/{name}-",
+        f"-artifact_prefix={folder}/{name}-",
     ]
     atheris.Setup([sys.argv[0], *options, str(corpus)], target.run)
     atheris.Fuzz()
@@ -57,6 +59,16 @@ def main() -> int:
     parser.add_argument("--here", action="store_true", help=argparse.SUPPRESS)
     chosen = parser.parse_args()
 
+    is_run = not (chosen.list or chosen.write)
+    if is_run and find_spec("atheris") is None:
+        print(MISSING, file=sys.stderr)  # noqa: T201
+        return 2
+    if chosen.here:
+        run(chosen.names[0], chosen.corpus, chosen.seconds)
+        return 0
+
+    from tests.fuzz.targets.table import targets
+
     names = chosen.names or sorted(targets())
     unknown = sorted(set(names) - targets().keys())
     if unknown:
@@ -69,13 +81,6 @@ def main() -> int:
         for name in names:
             written(name, chosen.corpus)
         return 0
-    if find_spec("atheris") is None:
-        print(MISSING, file=sys.stderr)  # noqa: T201
-        return 2
-    if chosen.here:
-        run(names[0], written(names[0], chosen.corpus), chosen.seconds)
-        return 0
-
     # Atheris ends the process of a target.
     failed = 0
     for name in names:
