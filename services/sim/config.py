@@ -82,8 +82,7 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         Literal["cameras", "percepts"],
         msgspec.Meta(
             description="cameras: rendered images and odometry are published, and perception "
-            "runs. percepts: published, in lockstep, with the errors that perception "
-            "was measured to make."
+            "runs. percepts: published with the errors that perception was measured to make."
         ),
     ] = "cameras"
     duration_s: Annotated[
@@ -153,11 +152,6 @@ def check(config: Config, run: Run) -> None:
         )
 
     towns.check(config.town)
-
-    if config.sensing == "percepts" and not run.lockstep:
-        raise ConfigError(
-            "[sim] a town is sensed by percepts in lockstep only: set run.lockstep to true"
-        )
 
     if config.removals and config.sensing != "percepts":
         raise ConfigError(

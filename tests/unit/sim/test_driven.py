@@ -366,8 +366,3 @@ def test_a_closure_of_a_street_that_was_misspelt_names_the_one_that_was_meant() 
 def test_a_town_that_there_is_none_of_is_refused(town: str) -> None:
     with pytest.raises(ConfigError, match=r"choose loop, blocks, osm:FILE.*or FILE\.toml"):
         build(Config(town=town))
-
-
-def test_percepts_of_a_town_in_real_time_are_refused() -> None:
-    with pytest.raises(ConfigError, match="lockstep"):
-        build(Config(sensing="percepts"))

@@ -17,6 +17,8 @@ from cogmap.schemas.process import Clock
 from cogmap.schemas.sensing import (
     MotorCommand,
     Odometry,
+    Percepts,
+    SelfMotion,
     SpeedLimit,
     StereoFrame,
     TruePose,
@@ -160,6 +162,14 @@ def test_real_time_keeps_its_rates_and_frames_follow_their_odometry() -> None:
 
     assert 12.0 < poses[-1].travelled_m < 18.0
     assert poses[-1].progress == pytest.approx(poses[-1].stamp_ns / 900e9)
+
+
+def test_a_town_is_sensed_by_percepts_in_real_time_too() -> None:
+    module = build(Config(sensing="percepts"))
+    _start(module)
+    messages = _real_time(module, 21, answer=False)
+
+    assert len(of_type(SelfMotion, messages)) == len(of_type(Percepts, messages)) == 6
 
 
 def test_real_time_falls_behind_rather_than_catch_up_over_0_25_s() -> None:
