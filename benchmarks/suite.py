@@ -22,6 +22,7 @@ from benchmarks.explore import measure as explore
 from benchmarks.export import measure as export
 from benchmarks.faults import measure as faults
 from benchmarks.fuzz import measure as fuzz
+from benchmarks.forge import measure as forge
 from benchmarks.individuals import measure as individuals
 from benchmarks.learning import measure as learning
 from benchmarks.lifelong import measure as lifelong
@@ -196,6 +197,7 @@ SUITE = (
     ),
     Benchmark("ablation", {}, paper.measure_ablation, has_command=False),
     Benchmark("fuzz", fuzz.THRESHOLDS, fuzz.measure, options=fuzz.OPTIONS, in_all=False),
+    Benchmark("forge", forge.THRESHOLDS, forge.measure, options=forge.OPTIONS, in_all=False),
     Benchmark("constants", {}, constants.measure, options=constants.OPTIONS, in_all=False),
 )
 NAMES = tuple(benchmark.name for benchmark in SUITE)
