@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import zenoh
 
@@ -14,6 +16,7 @@ from cogmap.schemas.base import Message
 from cogmap.schemas.topics import Topic
 
 Identity = tuple[str, int, int, int]
+ANSWER_S = 1.0
 BLOCK = zenoh.CongestionControl.BLOCK
 
 
@@ -39,6 +42,32 @@ class Forger:
         self.session.put(
             key, encode(message), attachment=encode(envelope), congestion_control=BLOCK
         )
+
+    def ask(self, request: Topic, message: Message) -> None:
+        """Ask for an answer, and wait for none."""
+        key = request.key(self._agent)
+        self.session.get(key, payload=encode(message), timeout=ANSWER_S)
+
+    @contextmanager
+    def answering(
+        self, request: Topic, message: Message, envelope: Envelope
+    ) -> Iterator[Callable[[], int]]:
+        """Answer whoever asks for `request` meanwhile. Yields a function that returns how often."""
+        asked = 0
+        attachment = encode(envelope)
+        payload = encode(message)
+
+        def respond(query: zenoh.Query) -> None:
+            nonlocal asked
+            asked += 1
+            with query:
+                query.reply(query.key_expr, payload, attachment=attachment)
+
+        answers = self.session.declare_queryable(request.key(self._agent), respond)
+        try:
+            yield lambda: asked
+        finally:
+            answers.undeclare()  # type: ignore[no-untyped-call]
 
     def has_put(self, envelope: Envelope) -> bool:
         """Return whether it is an envelope of this forger's."""

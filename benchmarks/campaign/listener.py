@@ -53,7 +53,8 @@ class Place:
 
 class Listener:
     """Keeps what genuine modules publish: the newest message of every topic, and all commands,
-    poses and reports of health. `is_forged` tells what an attacker has put.
+    poses and reports of health. `is_forged` tells what an attacker has put; of the sources in
+    `trusted` only that incarnation is genuine.
 
     `pump` it from one thread.
     """
@@ -66,6 +67,7 @@ class Listener:
         self.health: defaultdict[str, list[tuple[float, Health]]] = defaultdict(list)
         self.programs: list[bytes] = []
         self.on_topic: Callable[[Topic], None] = lambda topic: None
+        self.trusted: dict[str, int] = {}
         self._is_forged = is_forged
         self._arrivals: SimpleQueue[tuple[float, Arrival]] = SimpleQueue()
         self._answered_ns = -1
@@ -97,6 +99,9 @@ class Listener:
     def _take(self, time_s: float, arrival: Arrival) -> None:
         envelope = arrival.envelope
         if envelope is None or self._is_forged(envelope):
+            return
+        trusted = self.trusted.get(envelope.source, envelope.incarnation)
+        if envelope.incarnation != trusted:
             return
 
         payload = bytes(arrival.payload)

@@ -54,6 +54,12 @@ class RunningSystem:
         """Return whether the drive is over, for whatever reason."""
         return self._process.poll() is not None
 
+    @property
+    def last_line(self) -> str:
+        """Return what the drive has shown last."""
+        lines = self.output.read_text(errors="replace").splitlines()
+        return lines[-1].strip() if lines else ""
+
     def end(self) -> None:
         """Ask it to end, and all its processes with it; kill it after END_S."""
         if not self.has_ended:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from benchmarks.campaign.listener import CARRIED
 from cogmap.errors import UsageError
 from cogmap.schemas import topics
-from cogmap.schemas.topics import Topic
+from cogmap.schemas.topics import Delivery, Topic
 from cogmap.services import registry
 
 
@@ -44,6 +44,15 @@ OF_MODULES = (Kind.GHOST, Kind.SECOND_INSTANCE)
 OF_PEOPLE = (topics.STREET_CLOSURE, topics.RESET, topics.PAUSE, topics.OFFER)
 """Anybody may publish these, under any name: to do so is no lie."""
 
+ANSWERED = {
+    topics.SNAPSHOT: (Kind.FAR_STAMP, Kind.FAR_CYCLE, Kind.FAR_VERSION, Kind.OTHER_SOURCE),
+    topics.SNAPSHOT_REQUEST: (Kind.FAR_VERSION, Kind.FLOOD),
+    topics.SETTINGS_REQUEST: (Kind.FLOOD,),
+}
+"""The lies about what is asked for and answered: a stranger asks, or answers. Settings are answered
+to people alone.
+"""
+
 TOLD_AS_ONESELF = (Kind.OTHER_SOURCE, Kind.NEW_INCARNATION)
 
 
@@ -68,7 +77,7 @@ def every(modes: Iterable[Mode]) -> list[Case]:
     """Return all cases, in the order of modes and topics, the modules' last."""
     found = []
     for mode in modes:
-        for topic in CARRIED:
+        for topic in (*CARRIED, *ANSWERED):
             found += [Case(topic.name, kind, mode) for kind in kinds_of(topic)]
         for module in registry.taking_part():
             found += [Case(module, kind, mode) for kind in OF_MODULES]
@@ -77,6 +86,9 @@ def every(modes: Iterable[Mode]) -> list[Case]:
 
 def kinds_of(topic: Topic) -> list[Kind]:
     """Return the lies that can be told on a topic."""
+    if topic.delivery is Delivery.ON_REQUEST:
+        return list(ANSWERED.get(topic, ()))
+
     found = []
     for kind in Kind:
         fields = FIELDS.get(kind)

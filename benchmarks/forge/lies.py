@@ -8,7 +8,10 @@ from msgspec.structs import replace
 
 from benchmarks.forge.cases import FIELDS, Kind
 from cogmap.schemas.base import Message
+from cogmap.schemas.codelets import Proposal, Task
 from cogmap.schemas.cognition import Action, ActionName, Behaviours, MotorProgram
+from cogmap.schemas.graph import Delta, Snapshot
+from cogmap.schemas.nodes.base import Node
 from cogmap.schemas.process import Pause
 from cogmap.schemas.sensing import MotorCommand
 
@@ -23,6 +26,10 @@ BACKWARDS_RAD_S = -15.0
 
 TURN_RAD = 2.71828
 """A turn that no module of ours commands to the last digit."""
+
+
+LIE = Node(id="lie", kind="lie", activation=1.0, base_level=1.0)
+"""What a graph has that follows a forged delta, and the workspace's has not."""
 
 
 def lie(kind: Kind, true: Message, number: int, told: int) -> Message:
@@ -51,19 +58,44 @@ def lie(kind: Kind, true: Message, number: int, told: int) -> Message:
     return replace(_commanding(true), **changes)
 
 
+def in_time(true: Message, now_ns: int, task: Task | None) -> Message:
+    """Return `true` as its source would publish it next: a command answers the newest view, of
+    `now_ns`; a proposal the newest `task`; a delta has the next version.
+    """
+    match true:
+        case MotorCommand():
+            return replace(true, stamp_ns=now_ns)
+        case Proposal() if task is not None:
+            return Proposal(
+                stamp_ns=task.stamp_ns,
+                source=true.source,
+                task_id=task.task_id,
+                codelet=task.codelet,
+                base_version=task.version,
+            )
+        case Delta():
+            return replace(true, version=true.version + 1)
+    return true
+
+
 def _commanding(message: Message) -> Message:
-    """Return a message that commands what can be told from what the agent wants."""
-    turn = {"action": ActionName.TURN.value, "parameters": {"turn_rad": TURN_RAD}}
+    """Return a message that commands what can be told from what the agent wants, or has one node
+    more or less than the workspace's graph.
+    """
+    turn: dict[str, Any] = {"action": ActionName.TURN.value, "parameters": {"turn_rad": TURN_RAD}}
+    changes: dict[str, Any] = {}
     match message:
         case MotorCommand():
-            return replace(
-                message, left_wheel_rad_s=BACKWARDS_RAD_S, right_wheel_rad_s=BACKWARDS_RAD_S
-            )
+            wheels = ("left_wheel_rad_s", "right_wheel_rad_s")
+            changes = dict.fromkeys(wheels, BACKWARDS_RAD_S)
         case Action() | MotorProgram():
-            return replace(message, **turn)
+            changes = turn
         case Behaviours():
-            turning = [replace(each, **turn) for each in message.behaviours]
-            return replace(message, behaviours=turning)
+            changes["behaviours"] = [replace(each, **turn) for each in message.behaviours]
+        case Delta():
+            changes["operations"] = [*message.operations, LIE]
+        case Snapshot():
+            changes["nodes"] = message.nodes[:-1]
         case Pause():
-            return replace(message, is_paused=False)
-    return message
+            changes["is_paused"] = False
+    return replace(message, **changes)

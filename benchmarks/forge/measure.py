@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from itertools import count
 from pathlib import Path
 
 import click
@@ -13,8 +12,9 @@ from rich.table import Table
 
 from benchmarks.benchmark import Setting
 from benchmarks.forge.cases import Case, Mode, every, selected
+from benchmarks.forge.driving import Driving
 from benchmarks.forge.outcome import Outcome
-from benchmarks.forge.trial import PATIENCE_S, Driving, Trial
+from benchmarks.forge.trial import PATIENCE_S, Trial
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
 from cogmap.cli.progress import bar
@@ -28,6 +28,9 @@ THRESHOLDS = {
     "unnamed": at_most(0),
 }
 TIME_LIMIT_S = 7200.0
+GRACE_S = 180.0
+"""So much longer than the campaign a drive lasts whose campaign was killed."""
+
 OPTIONS = (
     click.Option(
         ["--seed"],
@@ -94,7 +97,7 @@ def measure(
                       lost message of it or has a new note, and doctor finds nothing new about it
 
     One drive serves many cases: it is restarted where one stopped it, or left its graph forked.
-    Takes up to two hours; --time-limit-s and half a minute are its bound. For instance
+    Takes up to two hours; --time-limit-s and two minutes are its bound. For instance
 
     \b
     python -m benchmarks forge --only clock/far-stamp --real-time
@@ -102,45 +105,70 @@ def measure(
     """
     modes = [mode for mode in Mode if is_lockstep in (None, mode is Mode.LOCKSTEP)]
     chosen = selected(every(modes), cases, seed, only)
-    outcomes = tell(chosen, setting.folder, seed, time_limit_s, setting)
-    Console().print(table(outcomes))
-    return metrics(outcomes, len(chosen))
-
-
-def tell(
-    chosen: Sequence[Case], folder: Path, seed: int, time_limit_s: float, setting: Setting
-) -> list[Outcome]:
-    """Tell the lies of each case, and return what became of them."""
-    began_s = time.monotonic()
     outcomes: list[Outcome] = []
-    driving: Driving | None = None
-    numbers = count(1)
+    campaign = Campaign(setting.folder, seed, time_limit_s)
     try:
         with bar("lies") as progress:
             for case in chosen:
-                left_s = began_s + time_limit_s - time.monotonic()
-                if left_s <= 0:
+                if campaign.left_s <= 0:
                     break
-                if driving is not None and (
-                    driving.mode is not case.mode
-                    or driving.system.has_ended
-                    or not driving.await_motion(PATIENCE_S)
-                ):
-                    driving.close()
-                    driving = None
-                if driving is None:
-                    driving = Driving(folder / f"drive-{next(numbers)}", case.mode, seed, 3600)
-                outcome = Trial(driving, case).run()
+                outcome = campaign.tell(case)
                 outcomes.append(outcome)
                 setting.announce(line(outcome))
-                if not outcome.is_clean:
-                    driving.close()
-                    driving = None
                 progress(len(outcomes) / len(chosen))
     finally:
-        if driving is not None:
-            driving.close()
-    return outcomes
+        campaign.close()
+
+    console = Console()
+    console.print(table(outcomes))
+    failed = [str(outcome.case) for outcome in outcomes if outcome.failures]
+    console.print(f"failed, {len(failed)} of {len(outcomes)}: {', '.join(failed) or 'none'}")
+    return metrics(outcomes, len(chosen))
+
+
+class Campaign:
+    """Tells the lies of one case after the other, to a drive that is restarted where one stopped it
+    or left it another than it was. Its files are in `folder`. `close` it in the end.
+    """
+
+    def __init__(self, folder: Path, seed: int, time_limit_s: float) -> None:
+        self._folder = folder
+        self._seed = seed
+        self._until_s = time.monotonic() + time_limit_s
+        self._driving: Driving | None = None
+        self._drives = 0
+
+    @property
+    def left_s(self) -> float:
+        """Return how much of its time is left."""
+        return self._until_s - time.monotonic()
+
+    def tell(self, case: Case) -> Outcome:
+        """Tell the lies of `case`, and return what became of them."""
+        driving = self._driving_in(case.mode)
+        outcome = Trial(driving, case).run()
+        if not outcome.is_clean:
+            self.close()
+        return outcome
+
+    def close(self) -> None:
+        """End the drive."""
+        if self._driving is not None:
+            self._driving.close()
+            self._driving = None
+
+    def _driving_in(self, mode: Mode) -> Driving:
+        """Return a drive in which the robot moves."""
+        driving = self._driving
+        if driving is not None and driving.mode is mode and driving.await_motion(PATIENCE_S):
+            return driving
+
+        self.close()
+        self._drives += 1
+        folder = self._folder / f"drive-{self._drives}"
+        limit_s = max(0.0, self.left_s) + GRACE_S
+        self._driving = Driving(folder, mode, self._seed, limit_s)
+        return self._driving
 
 
 def line(outcome: Outcome) -> str:
