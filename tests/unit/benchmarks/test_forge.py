@@ -6,7 +6,7 @@ import pytest
 
 from benchmarks.campaign.listener import Command, Place
 from benchmarks.forge.cases import Case, Kind, Mode, every, kinds_of, selected
-from benchmarks.forge.lies import FAR_NS, STRANGER, TURN_RAD, lie
+from benchmarks.forge.lies import FAR_NS, LIE, STRANGER, TURN_RAD, in_time, lie
 from benchmarks.forge.measure import metrics
 from benchmarks.forge.outcome import (
     Outcome,
@@ -17,8 +17,10 @@ from benchmarks.forge.outcome import (
 )
 from cogmap.errors import UsageError
 from cogmap.schemas import topics
+from cogmap.schemas.codelets import Proposal, Task
 from cogmap.schemas.cognition import Action
 from cogmap.schemas.examples import example
+from cogmap.schemas.graph import Delta
 from cogmap.schemas.sensing import MotorCommand, Pose, TruePose
 
 ALL = every(list(Mode))
@@ -87,6 +89,25 @@ def test_a_lie_about_what_moves_the_robot_commands_what_the_agent_would_not() ->
     assert isinstance(action, Action)
     assert action.parameters == {"turn_rad": TURN_RAD}
     assert action.source == STRANGER
+
+
+def test_a_proposal_answers_the_newest_task_with_nothing() -> None:
+    task = example(topics.TASK)
+    assert isinstance(task, Task)
+    told = in_time(example(topics.PROPOSAL), 0, task)
+
+    assert isinstance(told, Proposal)
+    assert (told.task_id, told.codelet, told.operations) == (task.task_id, task.codelet, [])
+
+
+def test_a_delta_continues_the_newest_version_with_a_node_of_the_liars_own() -> None:
+    true = example(topics.DELTA)
+    assert isinstance(true, Delta)
+    told = lie(Kind.NEW_INCARNATION, in_time(true, 0, None), 0, 0)
+
+    assert isinstance(told, Delta)
+    assert told.version == true.version + 1
+    assert told.operations == [*true.operations, LIE]
 
 
 def test_an_agent_stands_until_a_command_turns_its_wheels() -> None:
