@@ -42,7 +42,7 @@ FIELDS = {Kind.FAR_CYCLE: ("cycle",), Kind.FAR_VERSION: ("version", "base_versio
 
 OF_MODULES = (Kind.GHOST, Kind.SECOND_INSTANCE)
 OF_PEOPLE = (topics.STREET_CLOSURE, topics.RESET, topics.PAUSE, topics.OFFER)
-"""Anybody may publish these, under any name: to do so is no lie."""
+"""People may publish these, under any name, and know no time of the agent's: that is no lie."""
 
 ANSWERED = {
     topics.SNAPSHOT: (Kind.FAR_STAMP, Kind.FAR_CYCLE, Kind.FAR_VERSION, Kind.OTHER_SOURCE),
@@ -93,7 +93,7 @@ def kinds_of(topic: Topic) -> list[Kind]:
     for kind in Kind:
         fields = FIELDS.get(kind)
         has_field = fields is None or any(field in topic.type.__struct_fields__ for field in fields)
-        is_allowed = topic in OF_PEOPLE and kind in TOLD_AS_ONESELF
+        is_allowed = topic in OF_PEOPLE and kind in (Kind.OLD_STAMP, *TOLD_AS_ONESELF)
         if has_field and not is_allowed and kind not in OF_MODULES:
             found.append(kind)
     return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from concurrent.futures import Future
+from itertools import pairwise
 
 from benchmarks.forge.cases import Case
 from benchmarks.forge.driving import Driving, Sentences
@@ -27,6 +28,9 @@ WATCH_S = 2.5
 PATIENCE_S = 8.0
 HEALTH_S = 1.2
 """A report of health may come so long after what it counts."""
+
+DEAF_S = 1.5
+"""Without such a report for so long, nobody rejects the topic any more."""
 
 
 class Trial:
@@ -57,8 +61,10 @@ class Trial:
 
         outcome = self._outcome
         outcome.lies = teller.lies
-        outcome.remark = teller.remark or driving.system.last_line
+        outcome.remark = teller.remark
         outcome.ended = driving.system.has_ended
+        if outcome.ended:
+            outcome.remark = driving.system.last_line
         outcome.stood_s = longest_stand_s(listener.commands, last_lie_s, now_s)
         if not self._moves_since(max(last_lie_s, now_s - STOPPED_S)):
             outcome.recovered_s = None
@@ -99,20 +105,20 @@ class Trial:
         return any(each.moves and each.time_s > time_s for each in commands)
 
     def _deaf_s(self, last_lie_s: float, now_s: float) -> float | None:
-        """Return how long after the last lie messages of its topic were still rejected; None if
-        they are.
+        """Return how long after the last lie somebody rejected most messages of its topic; None if
+        somebody does.
         """
+        topic = self._case.subject
         last_s = last_lie_s
         for reports in self._listener.health.values():
-            before = None
-            for time_s, health in reports:
-                count = health.rejected.get(self._case.subject, 0)
-                if before is not None and count > before and time_s > last_lie_s + HEALTH_S:
+            for (_, before), (time_s, after) in pairwise(reports):
+                rejected = after.rejected.get(topic, 0) - before.rejected.get(topic, 0)
+                received = after.received.get(topic, 0) - before.received.get(topic, 0)
+                if rejected > received and time_s > last_lie_s + HEALTH_S:
                     last_s = max(last_s, time_s)
-                before = count
-        if last_s > last_lie_s and last_s > now_s - 1.5:
-            return None
-        return last_s - last_lie_s
+
+        is_deaf = last_lie_s < last_s and now_s < last_s + DEAF_S
+        return None if is_deaf else last_s - last_lie_s
 
     def _is_steered(self, began_s: float) -> bool:
         """Return whether the robot drove backwards as a lie commanded, or executes its turn."""
