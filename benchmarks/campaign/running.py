@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import subprocess
+import time
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 
-from cogmap.bus.session import DEFAULT_AGENT, free_endpoint
+from cogmap.bus.session import DEFAULT_AGENT, free_endpoint, listens
 from cogmap.cli.launch.command_line import cogmap_command, environment
 
 END_S = 30.0
+POLL_S = 0.1
 PERCEPT_LEVEL = ("--set", "sim.sensing=percepts", "--set", "planning.explore=true")
 """Nothing is rendered: so a drive takes little of the machine."""
 
@@ -61,14 +62,15 @@ class RunningSystem:
         return lines[-1].strip() if lines else ""
 
     def end(self) -> None:
-        """Ask it to end, and all its processes with it; kill it after END_S."""
-        if not self.has_ended:
-            self._process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            self._process.wait(END_S)
-        if not self.has_ended:
-            self._process.kill()
-            self._process.wait()
+        """Kill it, which takes no time for a summary, and wait until its processes have ended: the
+        router is the last of them.
+        """
+        self._process.kill()
+        self._process.wait()
+        port = int(self.endpoint.rpartition(":")[2])
+        until_s = time.monotonic() + END_S
+        while listens(port) and time.monotonic() < until_s:
+            time.sleep(POLL_S)
 
     def sizes(self) -> dict[Path, int]:
         """Return how long each text that it writes is by now."""

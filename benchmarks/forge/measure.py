@@ -28,6 +28,7 @@ THRESHOLDS = {
     "unnamed": at_most(0),
 }
 TIME_LIMIT_S = 7200.0
+LINE = 160
 GRACE_S = 180.0
 """So much longer than the campaign a drive lasts whose campaign was killed."""
 
@@ -174,30 +175,36 @@ class Campaign:
 def line(outcome: Outcome) -> str:
     """Return what became of a case, for who waits."""
     failures = ", ".join(outcome.failures) or "ok"
-    recovered = "never" if outcome.recovered_s is None else f"{outcome.recovered_s:.1f} s"
-    named = outcome.named_by[0][:110] if outcome.named_by else "-"
+    named = outcome.named_by[0] if outcome.named_by else "nobody"
+    remark = f"; {outcome.remark}" if outcome.remark else ""
     return (
         f"{outcome.case}: {failures}; lies {outcome.lies}, stood {outcome.stood_s:.1f} s, itself "
-        f"{recovered}{', ended' if outcome.ended else ''} {outcome.remark}; named: {named}"
+        f"after {_recovered(outcome)} s{remark}; named by {named[:LINE]}"
     )
 
 
 def table(outcomes: Sequence[Outcome]) -> Table:
     """Return the table of cases and what became of them."""
     made = Table(title="lies")
-    for heading in ("case", "lies", "stood s", "itself after s", "failed", "named by"):
-        made.add_column(heading)
+    made.add_column("case", no_wrap=True)
+    for heading in ("lies", "stood s", "itself s"):
+        made.add_column(heading, justify="right")
+    made.add_column("failed")
+
     for outcome in outcomes:
-        recovered = "never" if outcome.recovered_s is None else f"{outcome.recovered_s:.1f}"
+        failures = ", ".join(outcome.failures)
         made.add_row(
             str(outcome.case),
             str(outcome.lies),
             f"{outcome.stood_s:.1f}",
-            recovered,
-            ", ".join(outcome.failures),
-            outcome.named_by[0] if outcome.named_by else "",
+            _recovered(outcome),
+            f"[red]{failures}" if failures else "[green]none",
         )
     return made
+
+
+def _recovered(outcome: Outcome) -> str:
+    return "never" if outcome.recovered_s is None else f"{outcome.recovered_s:.1f}"
 
 
 def metrics(outcomes: Sequence[Outcome], chosen: int) -> Metrics:
