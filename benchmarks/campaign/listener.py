@@ -35,12 +35,13 @@ class Received:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A motor command that answers a view later than those before it: when it came, monotonic, and
-    whether it turns a wheel.
+    """A motor command that answers a view later than those before it: when it came, monotonic,
+    whether it turns a wheel, and the reason where it halts them.
     """
 
     time_s: float
     moves: bool
+    halted_by: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +140,7 @@ class Listener:
 
         self._answered_ns = command.stamp_ns
         fastest_rad_s = max(abs(command.left_wheel_rad_s), abs(command.right_wheel_rad_s))
-        self.commands.append(Command(time_s, fastest_rad_s > MOVING_RAD_S))
+        self.commands.append(Command(time_s, fastest_rad_s > MOVING_RAD_S, command.halted_by.value))
 
 
 MAX_AHEAD_NS = 1_000_000_000

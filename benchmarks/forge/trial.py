@@ -61,13 +61,11 @@ class Trial:
 
         outcome = self._outcome
         outcome.lies = teller.lies
-        outcome.remark = teller.remark
         outcome.ended = driving.system.has_ended
-        if outcome.ended:
-            outcome.remark = driving.system.last_line
         outcome.stood_s = longest_stand_s(listener.commands, last_lie_s, now_s)
         if not self._moves_since(max(last_lie_s, now_s - STOPPED_S)):
             outcome.recovered_s = None
+        outcome.remark = teller.remark or self._reason(last_lie_s)
         outcome.is_steered = self._is_steered(began_s)
         if not outcome.has_stopped:
             outcome.is_forked = self._is_forked(last_lie_s)
@@ -98,6 +96,19 @@ class Trial:
             is_itself = recovered_s is not None and (moves or watched_s > STOPPED_S)
             if watched_s > PATIENCE_S or (is_itself and watched_s > WATCH_S and doctor.done()):
                 return
+
+    def _reason(self, last_lie_s: float) -> str:
+        """Return why it stopped, as far as can be seen from outside."""
+        if not self._outcome.has_stopped:
+            return ""
+        if self._outcome.ended:
+            return self._driving.system.last_line
+
+        since = [each for each in self._listener.commands if each.time_s > last_lie_s]
+        if not since:
+            return "no command came"
+        reasons = sorted({each.halted_by or "none stated" for each in since if not each.moves})
+        return f"{len(since)} commands came, halted by {', '.join(reasons) or 'nothing'}"
 
     def _moves_since(self, time_s: float) -> bool:
         """Return whether a command has turned wheels since."""
