@@ -25,7 +25,7 @@ from cogmap.schemas.graph import SnapshotRequest
 from cogmap.schemas.topics import Topic
 from cogmap.services import registry
 
-START_S = 90.0
+START_S = 120.0
 LAPS = "40"
 """More than a campaign takes."""
 
