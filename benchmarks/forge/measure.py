@@ -117,6 +117,10 @@ def measure(
                 outcomes.append(outcome)
                 setting.announce(line(outcome))
                 progress(len(outcomes) / len(chosen))
+    except CogmapError as error:
+        if not outcomes:
+            raise
+        setting.announce(f"the rest is left out: {error}")
     finally:
         campaign.close()
 
