@@ -45,6 +45,7 @@ from benchmarks.real import places as real_places
 from benchmarks.real import stereo as real_stereo
 from benchmarks.report import Metrics, Outcome, with_machine_unit
 from benchmarks.ros2 import measure as ros2
+from benchmarks.soak import measure as soak
 from benchmarks.spiking import measure as spiking
 from benchmarks.stall import measure as stall
 from cogmap.errors import CogmapError, UsageError
@@ -198,6 +199,7 @@ SUITE = (
     Benchmark("ablation", {}, paper.measure_ablation, has_command=False),
     Benchmark("fuzz", fuzz.THRESHOLDS, fuzz.measure, options=fuzz.OPTIONS, in_all=False),
     Benchmark("forge", forge.THRESHOLDS, forge.measure, options=forge.OPTIONS, in_all=False),
+    Benchmark("soak", soak.THRESHOLDS, soak.measure, options=soak.OPTIONS, in_all=False),
     Benchmark("constants", {}, constants.measure, options=constants.OPTIONS, in_all=False),
 )
 NAMES = tuple(benchmark.name for benchmark in SUITE)

@@ -41,6 +41,7 @@ Examples:
   cogmap log record -e '^workspace/'         what the workspace publishes
   cogmap log record -o drive.mcap --split-s 600    drive.mcap, drive-2.mcap ...
   cogmap log record -o log-2.mcap --after log.mcap    and what log.mcap lacks, having been killed
+  cogmap log record -o week.mcap --split-mb 500 --keep 20  the last 10 GB
   cogmap log record -o fall.mcap --snapshot-s 30   the last half minute, whenever s is pressed
 """
 
@@ -73,6 +74,13 @@ Examples:
     type=FiniteRange(min=0, min_open=True),
     metavar="MB",
     help="Begin another file once one has so many megabytes.",
+)
+@click.option(
+    "--keep",
+    type=click.IntRange(min=1),
+    metavar="FILES",
+    help="Of a recording that is split, keep the newest so many finished files, and remove older "
+    "ones.  [default: all]",
 )
 @click.option(
     "--snapshot-s",
@@ -112,6 +120,7 @@ def record(
     max_duration: float | None,
     split_s: float | None,
     split_mb: float | None,
+    keep: int | None,
     snapshot_s: float | None,
     start_paused: bool,
     after: tuple[Path, ...],
@@ -131,8 +140,8 @@ def record(
     The file is written four times a second: killing the recorder loses at most 0.25 s. At the end
     the missing messages of each publisher are printed, and noted in the file. The file also holds
     the configuration, which `cogmap log replay` uses. Of a recording that was split, `cogmap log
-    merge` makes one log again: a graph, and a replay into modules, need it from its beginning and
-    without a pause.
+    merge` makes one log again: a graph, and a replay into modules, need it from its beginning, so
+    with all of its files, and without a pause.
     """
     if everything and (topics or regex):
         raise click.UsageError("--all records every topic: leave it out, or the choice of topics")
@@ -141,6 +150,9 @@ def record(
         raise click.UsageError(
             "--snapshot-s makes files of its own: leave --split-s and --split-mb out"
         )
+
+    if keep and not (split_s or split_mb):
+        raise click.UsageError("--keep counts the files of a split recording: add --split-mb")
 
     chosen = selection.to_record(topics, regex, exclude)
     about = {"agent": agent, "config": json.dumps(config.load(config_path, settings))}
@@ -160,6 +172,7 @@ def record(
                 split=recorder.Split(
                     max_s=split_s or math.inf,
                     max_bytes=1e6 * (split_mb or math.inf),
+                    keep=keep,
                 ),
                 snapshot_s=snapshot_s,
                 after=after,

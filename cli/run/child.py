@@ -40,6 +40,11 @@ class DriveProcess:
         assert self._process.stderr is not None
         return self._process.stderr
 
+    @property
+    def pid(self) -> int:
+        """Return its process id."""
+        return self._process.pid
+
     def poll(self) -> int | None:
         """Return its exit code; None while it goes on."""
         return self._process.poll()

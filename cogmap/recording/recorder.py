@@ -67,10 +67,13 @@ class Summary(msgspec.Struct, kw_only=True):
 
 @dataclass(frozen=True, kw_only=True)
 class Split:
-    """When another file begins: once one is so large, or so old. Without either, never."""
+    """When another file begins: once one is so large, or so old. Without either, never. Of those
+    that are finished, the newest `keep` stay; None for all.
+    """
 
     max_bytes: float = math.inf
     max_s: float = math.inf
+    keep: int | None = None
 
 
 WHOLE = Split()
@@ -111,6 +114,7 @@ class Recorder:
         self._split = split
         self._path = path
         self._paths: list[Path] = []
+        self._begun = 0
         self._size_bytes = 0
         self._recent: Recent | None = None
         self._writer: LogWriter | None = None
@@ -219,12 +223,22 @@ class Recorder:
     def _opened(self) -> LogWriter:
         """Begin a file: the first by the name that was given, others with a number."""
         path = self._path
-        if self._paths:
-            path = path.with_stem(f"{path.stem}-{len(self._paths) + 1}")
+        self._begun += 1
+        if self._begun > 1:
+            path = path.with_stem(f"{path.stem}-{self._begun}")
         facts = {"began_ns": str(time.time_ns()), **self._about}
         writer = LogWriter(path, self._topics, facts, self._compression)
+        self._remove_old()
         self._paths.append(path)
         return writer
+
+    def _remove_old(self) -> None:
+        """Remove the oldest finished files, so that as many stay as are to be kept."""
+        keep = self._split.keep
+        while keep is not None and len(self._paths) > keep:
+            oldest = self._paths.pop(0)
+            self._size_bytes -= oldest.stat().st_size
+            oldest.unlink()
 
     def _finish(self, writer: LogWriter) -> Summary:
         """Finish a file. Returns the summary of the recording until now, which is noted in it."""

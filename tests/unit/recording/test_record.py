@@ -284,6 +284,18 @@ def test_a_recording_is_split_into_files_of_which_merge_makes_one(path: Path) ->
     assert not info(whole).gaps
 
 
+def test_of_a_split_recording_the_newest_files_are_kept_and_no_more(path: Path) -> None:
+    recorded = Recorded(path, split=Split(max_s=1e-9, keep=2))
+    for _ in range(5):
+        recorded.recorder.flush()
+    summary = recorded.end()
+
+    parts = sorted(part.name for part in path.parent.glob("*.mcap"))
+    assert parts == ["log-4.mcap", "log-5.mcap", "log-6.mcap"]
+    assert [Path(part).name for part in summary.paths] == parts
+    assert summary.size_bytes == sum(Path(part).stat().st_size for part in summary.paths)
+
+
 def test_a_file_that_is_large_enough_is_the_last_but_one(path: Path) -> None:
     empty = path.with_name("empty.mcap")
     Recorded(empty)
