@@ -1,6 +1,11 @@
 # Two images: `cogmap` has all but the OpenGL which draws the camera images of a simulated town, and
 # `sim` has that too.
-FROM debian:bookworm-slim AS system
+#
+# A tag may name another image tomorrow. Where there is a registry, build on one digest, which
+# `docker buildx imagetools inspect debian:bookworm-slim` tells:
+#   COGMAP_BASE=debian@sha256:... docker compose build
+ARG BASE=debian:bookworm-slim
+FROM ${BASE} AS system
 
 RUN apt-get update \
     && apt-get install -y --no-install-recommends python3 \
@@ -20,10 +25,11 @@ FROM system AS build
 
 RUN apt-get update && apt-get install -y --no-install-recommends python3-venv binutils
 
-COPY requirements/run.txt requirements/build.txt /opt/cogmap/requirements/
+# Of each package what was published under that version, or nothing.
+COPY requirements/run.hashes.txt /opt/cogmap/requirements/
 RUN python3 -m venv /opt/cogmap/venv \
-    && /opt/cogmap/venv/bin/pip install --no-cache-dir --no-compile \
-        -r /opt/cogmap/requirements/run.txt -r /opt/cogmap/requirements/build.txt
+    && /opt/cogmap/venv/bin/pip install --no-cache-dir --no-compile --require-hashes \
+        -r /opt/cogmap/requirements/run.hashes.txt
 
 # What no drive needs of the libraries: their tests, pybullet's robots and examples, symbols for
 # debuggers, and the copy of ONNX's runtime for programs in C.
@@ -39,11 +45,6 @@ RUN /opt/cogmap/venv/bin/pip install --no-cache-dir --no-deps --no-build-isolati
     && /opt/cogmap/venv/bin/pip uninstall --yes setuptools pip \
     && python3 -m compileall -q /opt/cogmap/venv/lib
 
-# The map of a drive is drawn with these fonts: each container would look for them anew, and say so.
-ENV MPLCONFIGDIR=/opt/cogmap/venv/matplotlib
-RUN /opt/cogmap/venv/bin/python -c 'import matplotlib.font_manager' \
-    && chmod -R a+rwX $MPLCONFIGDIR
-
 
 # In one layer, without what was removed from those below.
 FROM scratch AS cogmap
@@ -51,10 +52,11 @@ FROM scratch AS cogmap
 COPY --from=system / /
 COPY --from=build /opt/cogmap/venv /opt/cogmap/venv
 
-# A user who owns the folder of the runs may have any number, and has a home here too.
+# A user who owns the folder of the runs may have any number, and has a home here too. Where the
+# root file system is read-only, what draws keeps its list of fonts here as well.
 ENV PATH=/opt/cogmap/venv/bin:/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin \
     HOME=/tmp \
-    MPLCONFIGDIR=/opt/cogmap/venv/matplotlib \
+    MPLCONFIGDIR=/tmp/matplotlib \
     PYTHONUNBUFFERED=1
 LABEL org.opencontainers.image.title="Cogmap" \
     org.opencontainers.image.description="LIDA's cognitive architecture with spatial memory, as message-bus microservices" \

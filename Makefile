@@ -5,8 +5,9 @@ TRAINS := .venv/trains
 MEASURES := .venv/measures
 RERUN := .venv/rerun
 DOCUMENTS := .venv/documents
+AUDITS := .venv/audits
 
-.PHONY: help setup train-setup bench-setup rerun-setup demo test test-compose fuzz lint docs generated bench release clean
+.PHONY: help setup train-setup bench-setup rerun-setup demo test test-compose fuzz lint docs generated hashes sbom audit bench release clean
 
 help:
 	@sed -n 's/^\([a-z-]*\):.*## /\1\t/p' $(MAKEFILE_LIST) | expand -t 16
@@ -79,6 +80,23 @@ generated: setup ## what follows from the code: golden messages, tables and code
 	$(BIN)/python -m cogmap.schemas.export --golden schemas/golden
 	$(BIN)/cogmap architecture
 	$(BIN)/python -m tests.support.includes
+
+$(AUDITS): $(INSTALLED) requirements/audit.txt
+	$(PYTHON) -m venv .venv/audit
+	.venv/audit/bin/pip install --quiet --disable-pip-version-check -r requirements/audit.txt
+	touch $@
+
+AUDIT := .venv/audit/bin/python
+
+hashes: $(AUDITS) ## requirements/run.hashes.txt, after a change of run.txt or build.txt; takes minutes
+	$(AUDIT) -m tests.support.hashes
+
+sbom: $(AUDITS) ## what the container installs, as CycloneDX, in build/sbom.json
+	mkdir -p build
+	.venv/audit/bin/cyclonedx-py requirements --output-reproducible --of JSON -o build/sbom.json requirements/run.hashes.txt
+
+audit: $(AUDITS) ## known vulnerabilities of that; ends with 3 where no source of them can be reached
+	$(AUDIT) -m tests.support.audit
 
 bench: bench-setup ## every benchmark and experiment that has a threshold; make bench ARGS="--data DIR"
 	$(BIN)/python -m benchmarks all $(ARGS)

@@ -70,6 +70,8 @@ def cogmap(verbose: bool) -> None:
         format="%(asctime)s %(message)s",
         datefmt="%H:%M:%S",
     )
+    if not verbose:
+        logging.getLogger("matplotlib").setLevel(logging.WARNING)  # it says that it looks for fonts
 
 
 add_verbs(cogmap, VERBS)

@@ -235,6 +235,38 @@ def test_no_process_in_a_container_is_roots(compose: Compose, service: str) -> N
         assert "0" not in users
 
 
+@pytest.mark.parametrize("service", SERVICES)
+def test_a_container_is_bounded_and_writes_to_the_volume_alone(
+    compose: Compose, service: str
+) -> None:
+    for container in compose.containers(service):
+        (described,) = json.loads(docker("inspect", container))
+        host = described["HostConfig"]
+        volumes = [mount["Destination"] for mount in described["Mounts"] if mount["RW"]]
+
+        assert host["ReadonlyRootfs"]
+        assert host["CapDrop"] == ["ALL"]
+        assert host["Memory"] > 0
+        assert 0 < host["PidsLimit"] < 10_000
+        assert volumes == ["/var/lib/cogmap/runs"]
+
+
+def test_the_journal_is_on_the_volume_and_outlives_its_container(
+    watch: Watch, compose: Compose
+) -> None:
+    journal = "runs/latest/state/workspace.journal"
+    wait_until(watch, lambda: len(watch.tally.cycle_ms) > 5)
+    before = compose("exec", "-T", "workspace", "stat", "--format", "%i %s", journal).split()
+
+    compose("up", "--detach", "--no-deps", "--force-recreate", "workspace")
+    enough = len(watch.tally.cycle_ms) + 6
+    wait_until(watch, lambda: len(watch.tally.cycle_ms) >= enough)
+
+    after = compose("exec", "-T", "workspace", "stat", "--format", "%i %s", journal).split()
+    assert after[0] == before[0]
+    assert int(after[1]) > int(before[1])
+
+
 def test_the_dashboard_shows_the_system_in_its_containers(compose: Compose) -> None:
     async def cycle() -> int:
         address = f"http://127.0.0.1:{compose.dashboard_port}/news"
@@ -311,6 +343,12 @@ def test_a_drive_that_is_stopped_ends_the_system(compose: Compose) -> None:
     deadline_s = time.monotonic() + TIMEOUT_S
     while running := compose.running:
         assert time.monotonic() < deadline_s, running
+
+    for container in compose("ps", "--all", "--quiet").split():
+        (described,) = json.loads(docker("inspect", container))
+        state = described["State"]
+        assert state["ExitCode"] != 137, (described["Name"], "it was killed")
+        assert not state["OOMKilled"], described["Name"]
 
 
 def test_the_image_has_the_experiments(image: None) -> None:

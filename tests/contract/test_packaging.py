@@ -116,6 +116,6 @@ def test_the_notices_name_every_dependency_with_its_licence() -> None:
     rows = re.findall(r"^\| ([\w-]+) \| ([^|]+) \| [^|]+ \|$", notices, re.MULTILINE)
 
     named = {name: licence for name, licence in rows if name != "package"}
-    pinned = _pins("run", "train", "bench", "build", "dev", "rerun", "docs")
+    pinned = _pins("run", "train", "bench", "build", "dev", "rerun", "docs", "audit")
     assert named.keys() == pinned.keys()
     assert all(licence.strip() for licence in named.values())
