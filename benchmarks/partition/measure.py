@@ -29,7 +29,7 @@ POLL_S = 0.1
 # Before and after the link is cut.
 AROUND_S = 2.0
 # A case that makes no progress for so long has ended: longer than a lost link takes to be noticed.
-QUIET_S = 30.0
+QUIET_S = 60.0
 DELAY = Quality(delay_s=0.2)
 STALLS = Quality(stall_share=0.05)
 NARROW = Quality(rate_bytes_s=1e6)

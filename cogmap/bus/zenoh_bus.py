@@ -35,6 +35,8 @@ ANSWER_PRIORITY = zenoh.Priority.BACKGROUND
 # Zenoh answers from a cache on the thread that receives, with the cache locked: if it waited there
 # for a slow link, so would all that is published and received. The outbox has what is dropped.
 CACHE_REPLIES = ext.RepliesConfig(congestion_control=zenoh.CongestionControl.DROP)
+# Whoever fetches messages holds up later ones: they come first, a piece at a time.
+PAST_PRIORITY = zenoh.Priority.INTERACTIVE_LOW
 NONE_KEPT = b"none of them are kept"
 _LARGE_BYTES = 8 * 2**20
 # An image travels in batches, through the router and two threads in each process. On two cores it
@@ -232,7 +234,7 @@ class ZenohBus:
             raise NoAnswerError(f"{source!r} is no name of a source")
         replies = self._session.get(
             f"{past_key(self._agent, topic, source)}?first={first};last={last}",
-            priority=ANSWER_PRIORITY,
+            priority=PAST_PRIORITY,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=timeout_s,
         )
