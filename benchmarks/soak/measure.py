@@ -89,17 +89,19 @@ def measure(
     """
     run_s = 3600.0 * hours
     with bar("driving") as progress:
-        soak = Soak(setting.folder, run_s, is_of_percepts, seed)
+        soak = Soak(setting, run_s, is_of_percepts, seed)
         soak.run(progress)
     return soak.metrics()
 
 
 class Soak:
-    """One drive of `run_s`, with its files in `folder`, and what was sampled of it."""
+    """One drive of `run_s`, with its files in the setting's folder, and what was sampled of it."""
 
-    def __init__(self, folder: Path, run_s: float, is_of_percepts: bool, seed: int) -> None:
-        self._run = folder / "run"
-        self._logs = folder / "log"
+    def __init__(self, setting: Setting, run_s: float, is_of_percepts: bool, seed: int) -> None:
+        self._announce = setting.announce
+        self._run = setting.folder / "run"
+        self._logs = setting.folder / "log"
+        self._ended_early = False
         self._run_s = run_s
         self._period_s = max(MIN_PERIOD_S, run_s / SAMPLES)
         self._port = free_port()
@@ -112,8 +114,8 @@ class Soak:
         self._began_s = 0.0
 
     def run(self, progress: Progress) -> None:
-        """Drive for the time, and end every process. Raises CogmapError if the drive ends before,
-        or does not begin.
+        """Drive for the time, and end every process. Raises CogmapError if the drive does not
+        begin.
         """
         self._logs.mkdir()
         with ExitStack() as stack:
@@ -148,7 +150,14 @@ class Soak:
         at_s = 0.0
         due_s = 0.0
         while at_s < self._run_s:
-            check()
+            try:
+                check()
+            except CogmapError as error:
+                self._announce(f"the drive ended early, what it was is measured: {error}")
+                self._ended_early = True
+                self._run_s = at_s
+                return
+
             at_s = time.monotonic() - self._began_s
             if at_s >= due_s:
                 due_s += self._period_s
@@ -178,8 +187,8 @@ class Soak:
         is_journal_bounded = trends.is_journal_bounded(self._sizes, journal_limit_bytes)
 
         metrics = {
-            "memory_slope_mb_per_h_max": max(slopes.values()),
-            "descriptors_growth": max(growths.values()),
+            "memory_slope_mb_per_h_max": float(np.max([*slopes.values()])),
+            "descriptors_growth": float(np.max([*growths.values()])),
             "cycle_p50_end_over_begin": end_ms / begin_ms,
             "log_bounded": float(is_log_bounded),
             "journal_bounded": float(is_journal_bounded),
@@ -188,6 +197,7 @@ class Soak:
             "cycles": float(len(self._cycles.at_s)),
             "rounds": float(self._rounds.number),
             "hours": self._run_s / 3600.0,
+            "ended_early": float(self._ended_early),
             "restarts": float(len(self._samples) - len(lives)),
             "samples": float(len(self._sizes)),
             "log_mb_max": max(each.log_bytes for each in self._sizes) / 1e6,
