@@ -21,8 +21,8 @@ from benchmarks.dashboard import measure as dashboard
 from benchmarks.explore import measure as explore
 from benchmarks.export import measure as export
 from benchmarks.faults import measure as faults
-from benchmarks.fuzz import measure as fuzz
 from benchmarks.forge import measure as forge
+from benchmarks.fuzz import measure as fuzz
 from benchmarks.individuals import measure as individuals
 from benchmarks.learning import measure as learning
 from benchmarks.lifelong import measure as lifelong
