@@ -31,6 +31,7 @@ _EMITS = (
     topics.TRUE_POSE,
     topics.TRUE_TOWN,
     topics.PLAYBACK,
+    topics.PRESENCE,
 )
 
 
@@ -53,7 +54,7 @@ def build(config: Config, instance: str = NAME, run: Run = REAL_TIME) -> Module:
     required = run.participants or {NAME: 1}
     if run.lockstep:
         lockstep = Lockstep(playhead)
-        module.on(topics.PRESENCE, lockstep.on_presence, [topics.PRESENCE])
+        module.on(topics.PRESENCE, lockstep.on_presence, _EMITS)
         module.on(topics.MOTOR_COMMAND, lockstep.on_command, _EMITS)
         module.on(topics.PAUSE, lockstep.on_pause, _EMITS)
         module.on_start(lockstep.on_start, required, _EMITS)

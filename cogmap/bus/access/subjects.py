@@ -115,6 +115,7 @@ _MODULES = (
         publishes=(
             topics.CLOCK,
             topics.PAUSED,
+            topics.PRESENCE,
             topics.TRUE_POSE,
             topics.TRUE_TOWN,
             topics.ENERGY,
@@ -131,6 +132,7 @@ _MODULES = (
         publishes=(
             topics.CLOCK,
             topics.PAUSED,
+            topics.PRESENCE,
             topics.TRUE_POSE,
             topics.TRUE_TOWN,
             topics.PLAYBACK,
