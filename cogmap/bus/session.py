@@ -177,6 +177,18 @@ def open_router(endpoint: str, keys: Keys | None = None) -> zenoh.Session:
     return zenoh.open(_config("router", **settings))
 
 
+def from_here(endpoint: str) -> str:
+    """Return where this machine reaches a router that listens at `endpoint`: one that listens at
+    every address has a certificate for the loopback's, as no certificate names 0.0.0.0.
+    """
+    host, port = _address(endpoint)
+    protocol, _, _ = endpoint.partition("/")
+    own = {"0.0.0.0": "127.0.0.1", "::": "[::1]"}.get(host)
+    if own is not None:
+        return f"{protocol}/{own}:{port}"
+    return endpoint
+
+
 def check_free(endpoint: str) -> None:
     """Raise PortInUseError if something listens at `endpoint` already, or nothing can."""
     host, port = _address(endpoint)

@@ -11,7 +11,7 @@ from pathlib import Path
 from types import FrameType
 
 from cogmap.bus.access.subjects import ROUTER
-from cogmap.bus.session import EXPOSED, check_name, is_exposed, open_router
+from cogmap.bus.session import EXPOSED, check_name, from_here, is_exposed, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.runtime import environment
 from cogmap.runtime.company import company_at, watch_company
@@ -148,7 +148,7 @@ def run_router(endpoint: str, stop: Stop, agent: str = "", ends_with: str = "") 
     log.info("router listens at %s", endpoint)
     if keys is None and is_exposed(endpoint):
         log.warning("%s", EXPOSED)
-    with company_at(endpoint, agent, ends_with, keys) as is_alone:
+    with company_at(from_here(endpoint), agent, ends_with, keys) as is_alone:
         # Without a time limit, a signal that comes before it is not seen.
         while not stop.wait(IDLE_S) and not is_alone():
             pass

@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 from cogmap.bus.access import site
 from cogmap.bus.access.certificates import now_utc
 from cogmap.bus.access.subjects import SUBJECTS
-from cogmap.bus.session import is_exposed
+from cogmap.bus.session import from_here, is_exposed
 from cogmap.cli.doctor.keys import examine
 from cogmap.cli.main import cogmap
 from cogmap.errors import AccessError
@@ -112,3 +112,17 @@ def test_a_bus_of_its_own_has_no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_a_router_that_others_reach_is_known(endpoint: str, exposed: bool) -> None:
     assert is_exposed(endpoint) is exposed
+
+
+@pytest.mark.parametrize(
+    ("endpoint", "reached"),
+    [
+        ("tcp/0.0.0.0:7447", "tcp/127.0.0.1:7447"),
+        ("tls/[::]:7447", "tls/[::1]:7447"),
+        ("tls/robot.local:7447", "tls/robot.local:7447"),
+    ],
+)
+def test_a_router_at_every_address_is_reached_where_its_certificate_holds(
+    endpoint: str, reached: str
+) -> None:
+    assert from_here(endpoint) == reached

@@ -16,6 +16,7 @@ from benchmarks.perception.road import (
     road_iou,
 )
 from cogmap.errors import ConfigError
+from cogmap.files.digests import write_digests
 from cogmap.schemas.sensing import Calibration
 from cogmap.services.epam.layout.ground import project
 from cogmap.services.epam.layout.road import (
@@ -118,6 +119,7 @@ def test_unusable_weights_are_named_with_the_remedy(tmp_path: Path, content: byt
     weights = tmp_path / "mine.onnx"
     if content is not None:
         weights.write_bytes(content)
+        write_digests(weights)
 
     with pytest.raises(ConfigError, match=r"mine\.onnx.*cogmap train"):
         load(weights)
