@@ -49,13 +49,14 @@ def foxglove(host: str, port: int, connect: str, agent: str) -> None:
     """
     sdk = library()
     context = sdk.Context()
+    channels = Channels(sdk, context)
     with observing(connect, agent, VIEW) as bus:
         server = serve(sdk, context, agent, host, port)
         try:
             address = f"ws://{host}:{server.port}"
             click.echo(f"{agent} at {connect} for Foxglove: {address} (Ctrl-C ends it)")
             click.echo(f"in a browser: {server.app_url()}")
-            follow(bus, connect, SENSES, Channels(sdk, context).take)
+            follow(bus, connect, SENSES, channels.take)
         finally:
             server.stop()
 

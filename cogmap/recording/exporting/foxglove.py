@@ -42,6 +42,21 @@ NEED_SCHEMA = {
     "properties": {"need": {"type": "string"}, "level": {"type": "number"}},
 }
 """Foxglove itself has no type for a number that is to be plotted."""
+TYPES = {
+    "/camera": "CompressedImage",
+    "/camera/calibration": "CameraCalibration",
+    "/depth": "RawImage",
+    "/tf": "FrameTransform",
+    "/scan": "PointCloud",
+    "/pose": "PoseInFrame",
+    "/path": "PosesInFrame",
+    "/plan": "PosesInFrame",
+    "/objects": "SceneUpdate",
+    "/places": "Grid",
+    "/log": "Log",
+    "/truth": "PoseInFrame",
+}
+"""Foxglove's type of each other topic."""
 
 
 def write_foxglove(log: Log, path: Path, progress: Progress | None = None) -> dict[str, int]:
@@ -71,6 +86,9 @@ def write_foxglove(log: Log, path: Path, progress: Progress | None = None) -> di
 class Channels:
     """Turns the moments of a drive into messages of Foxglove, and sends them to whatever is open in
     `context`: a file, or a server.
+
+    All channels are open from the beginning. A server names a new one to its viewers before it lets
+    them subscribe to it: a quick viewer would be refused.
     """
 
     def __init__(self, foxglove: Any, context: Any) -> None:
@@ -78,8 +96,9 @@ class Channels:
         self._messages = foxglove.messages
         needs = foxglove.Channel(NEEDS, schema=NEED_SCHEMA, context=context)
         self._channels: dict[str, Any] = {NEEDS: needs}
-        self._context = context
-        self._library = foxglove
+        for topic, kind in TYPES.items():
+            channel = getattr(foxglove.channels, f"{kind}Channel")
+            self._channels[topic] = channel(topic, context=context)
         self._log_time_ns = 0
         self._shown: set[str] = set()
         self._writers: dict[type, Callable[[Any, Any], None]] = {
@@ -100,11 +119,7 @@ class Channels:
         self._writers[type(moment.content)](stamp, moment.content)
 
     def _write(self, topic: str, message: Any) -> None:
-        channel = self._channels.get(topic)
-        if channel is None:
-            kind = getattr(self._library.channels, f"{type(message).__name__}Channel")
-            channel = self._channels[topic] = kind(topic, context=self._context)
-        channel.log(message, log_time=self._log_time_ns)
+        self._channels[topic].log(message, log_time=self._log_time_ns)
         self.written[topic] += 1
 
     def _pose(self, x_m: float, y_m: float, heading_rad: float = 0.0, z_m: float = 0.0) -> Any:
