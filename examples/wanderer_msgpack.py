@@ -81,7 +81,11 @@ def run(endpoint: str, agent: str, stop: threading.Event) -> None:
     with zenoh.open(configuration(endpoint)) as session:
         commands = session.declare_publisher(f"cogmap/{agent}/motor/command")
         session.declare_subscriber(f"cogmap/{agent}/sensory/scan", scans.put)
-        ready = session.liveliness().declare_token(f"cogmap/{agent}/@ready/motor/{INSTANCE}")
+        prefix = f"cogmap/{agent}"
+        started = session.liveliness().declare_token(
+            f"{prefix}/@incarnation/motor/{INSTANCE}/{STARTED_NS}"
+        )
+        ready = session.liveliness().declare_token(f"{prefix}/@ready/motor/{INSTANCE}")
 
         number = 0
         while not stop.is_set():
@@ -100,6 +104,7 @@ def run(endpoint: str, agent: str, stop: threading.Event) -> None:
             )
             number += 1
         ready.undeclare()  # type: ignore[no-untyped-call]
+        started.undeclare()  # type: ignore[no-untyped-call]
 
 
 if __name__ == "__main__":

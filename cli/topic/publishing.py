@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import os
 import time
-from contextlib import suppress
 
 import msgspec
 
-from cogmap.bus.codec import Envelope, decode, encode
+from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.discovery import Process, Role, System
 from cogmap.bus.interface import Arrival, Bus
 from cogmap.cli.topic.observing import CLI
-from cogmap.errors import MessageError, UsageError
+from cogmap.errors import UsageError
 from cogmap.runtime.delivery.inbox import Inbox
+from cogmap.runtime.delivery.intake import Intake
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.topics import Topic
@@ -29,14 +30,16 @@ class Publisher:
         self.number = 0
         self._bus = bus
         self._topic = topic
+        # Two commands at once are two sources.
+        self._source = f"{CLI}-{os.getpid()}"
         self._incarnation = time.time_ns()
         bus.declare(topic)
 
     def publish(self, message: Message) -> None:
         """Publish one more."""
-        numbered = msgspec.structs.replace(message, source=CLI, seq=self.number)
+        numbered = msgspec.structs.replace(message, source=self._source, seq=self.number)
         now_ns = time.time_ns()
-        envelope = Envelope(CLI, self.number, self._incarnation, now_ns, now_ns)
+        envelope = Envelope(self._source, self.number, self._incarnation, now_ns, now_ns)
         self._bus.publish(self._topic, encode(numbered), envelope)
         self.number += 1
 
@@ -46,9 +49,10 @@ class Stamps:
 
     def __init__(self, bus: Bus, system: System) -> None:
         self._inbox = Inbox()
+        self._intake = Intake()
         self._newest_ns = 0
         self._timeout_s = FIRST_TICK_S if system.doing(Role.PUBLISHES, topics.CLOCK) else 0.0
-        bus.subscribe(topics.CLOCK, self._inbox.put, lambda name, number: None)
+        bus.subscribe(topics.CLOCK, self._inbox.put, self._intake.count_lost)
 
     def stamped(self, message: Message) -> Message:
         """Return `message` as of now; one that has a stamp keeps it.
@@ -65,8 +69,9 @@ class Stamps:
         arrival = self._inbox.take(self._timeout_s)
         self._timeout_s = 0.0
         while isinstance(arrival, Arrival):
-            with suppress(MessageError):
-                self._newest_ns = decode(topics.CLOCK, arrival.payload).stamp_ns
+            message = self._intake.accept(arrival)
+            if message is not None:
+                self._newest_ns = message.stamp_ns
             arrival = self._inbox.take(0.0)
 
 

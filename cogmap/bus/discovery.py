@@ -114,14 +114,15 @@ def discover(session: zenoh.Session, agent: str) -> System:
     every_member = Member("*", "*")
     return read(
         agent,
-        named=_tokens(session, identity_key(agent, "*", every_member)),
-        used=_tokens(session, use_key(agent, "*", "*", "**")),
-        ready=_tokens(session, ready_key(agent, every_member)),
+        named=tokens(session, identity_key(agent, "*", every_member)),
+        used=tokens(session, use_key(agent, "*", "*", "**")),
+        ready=tokens(session, ready_key(agent, every_member)),
         own_zid=str(session.zid()),
     )
 
 
-def _tokens(session: zenoh.Session, expression: str) -> list[str]:
+def tokens(session: zenoh.Session, expression: str) -> list[str]:
+    """Return the keys of the liveliness tokens that are there."""
     channel: zenoh.handlers.FifoChannel[zenoh.Reply] = zenoh.handlers.FifoChannel(MAX_TOKENS)
     replies = session.liveliness().get(expression, channel, timeout=ANSWER_TIMEOUT_S)
     return [str(reply.ok.key_expr) for reply in replies if reply.ok is not None]

@@ -14,12 +14,16 @@ Job = Callable[[], None]
 
 @dataclass(slots=True)
 class Arrival:
-    """One received message: still bytes, the envelope None if it could not be decoded."""
+    """One received message: still bytes, the envelope None if it could not be decoded.
+
+    `refused` says why it does not count, if its source's present incarnation is not its own.
+    """
 
     topic: Topic
     payload: bytes | memoryview
     envelope: Envelope | None
     received_ns: int
+    refused: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +55,17 @@ class Member:
     instance: str
 
 
+@dataclass(frozen=True, order=True)
+class Incarnation:
+    """One life of a source, in a process of `module`: `number` is when it began, in ns of wall
+    time, as its envelopes have it.
+    """
+
+    module: str
+    source: str
+    number: int
+
+
 class Bus(Protocol):
     """Carries bytes on topics between members.
 
@@ -61,7 +76,24 @@ class Bus(Protocol):
         """Prepare to publish on `topic`."""
 
     def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
-        """Send `payload` to every subscriber of `topic`, which has been declared."""
+        """Send `payload` to every subscriber of `topic`, which has been declared.
+
+        It claims the incarnation that the envelope names, unless that was claimed before.
+        """
+
+    def claim(self, incarnation: Incarnation) -> None:
+        """Let everybody know that this process publishes as that incarnation of its source: until
+        it claims another one of that source, this bus closes, or its process dies.
+        """
+
+    def incarnations(self) -> list[Incarnation]:
+        """Return those that are claimed now."""
+
+    def members(self) -> list[Member]:
+        """Return those that are ready now."""
+
+    def conflicts(self) -> list[str]:
+        """Say of each source as which several processes publish which one of them counts."""
 
     def subscribe(
         self,
@@ -72,6 +104,8 @@ class Bus(Protocol):
     ) -> None:
         """Hand every message of `topic` to `deliver`.
 
+        A message of an incarnation that nobody on the bus claims waits for that, in order; if it
+        waits in vain, or the source's present incarnation is another one, it comes as `refused`.
         `on_gap` is called with the topic's name and a number if messages are lost. Of a NEVER_DROP
         topic, up to `history` earlier messages of each publisher that is still there come first.
         """

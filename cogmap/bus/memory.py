@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 from cogmap.bus.codec import Envelope, decode_envelope
 from cogmap.bus.depth import cached_messages
-from cogmap.bus.interface import Answer, Arrival, Job, Member, Past
+from cogmap.bus.incarnations import UNNAMED, Gate
+from cogmap.bus.interface import Answer, Arrival, Incarnation, Job, Member, Past
 from cogmap.errors import NoAnswerError
 from cogmap.schemas.topics import Delivery, Topic
 
@@ -37,6 +38,7 @@ class MemoryNetwork:
         self.pasts: dict[tuple[Topic, str], Past] = {}
         self.members: dict[Member, MemoryBus] = {}
         self.buses: list[MemoryBus] = []
+        self.claims: list[tuple[Incarnation, MemoryBus]] = []
         self.watchers: list[Watcher] = []
 
     def deliver(self, arrival: Arrival) -> None:
@@ -49,10 +51,30 @@ class MemoryNetwork:
         self.members[member] = bus
         self._notify(member, True)
 
+    def claim(self, incarnation: Incarnation, bus: MemoryBus) -> None:
+        """Let every bus know that `bus` publishes as that incarnation."""
+        self.claims.append((incarnation, bus))
+        for each in tuple(self.buses):
+            each.gate.note(incarnation, True)
+
+    def withdraw(self, incarnation: Incarnation, bus: MemoryBus) -> None:
+        """Let every bus know that `bus` publishes as that incarnation no more."""
+        self.claims.remove((incarnation, bus))
+        if incarnation in self.incarnations():
+            return
+        for each in tuple(self.buses):
+            each.gate.note(incarnation, False)
+
+    def incarnations(self) -> list[Incarnation]:
+        """Return those that are claimed."""
+        return sorted({incarnation for incarnation, _ in self.claims})
+
     def leave(self, bus: MemoryBus) -> None:
         """Let the watchers know that the members of `bus` are gone."""
         if bus in self.buses:
             self.buses.remove(bus)
+        for incarnation in [each for each, owner in self.claims if owner is bus]:
+            self.withdraw(incarnation, bus)
         gone = [member for member, other in self.members.items() if other is bus]
         for member in gone:
             del self.members[member]
@@ -68,21 +90,46 @@ class MemoryBus:
 
     def __init__(self, network: MemoryNetwork) -> None:
         self.cache: dict[Topic, deque[Arrival]] = {}
+        self.gate = Gate()
         self._network = network
+        self._module = UNNAMED
+        self._claimed: dict[str, Incarnation] = {}
         self._subscriptions: list[Subscription] = []
         self._served: list[Topic] = []
         self._past_of: list[tuple[Topic, str]] = []
         network.buses.append(self)
+        for incarnation in network.incarnations():
+            self.gate.note(incarnation, True)
 
     def declare(self, topic: Topic) -> None:
         if topic.delivery is Delivery.NEVER_DROP:
             self.cache.setdefault(topic, deque(maxlen=cached_messages(topic)))
 
     def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
+        claimed = self._claimed.get(envelope.source)
+        if claimed is None or claimed.number != envelope.incarnation:
+            self.claim(Incarnation(self._module, envelope.source, envelope.incarnation))
+
         arrival = Arrival(topic, payload, envelope, envelope.sent_ns)
         if topic in self.cache:
             self.cache[topic].append(arrival)
         self._network.deliver(arrival)
+
+    def claim(self, incarnation: Incarnation) -> None:
+        before = self._claimed.get(incarnation.source)
+        self._claimed[incarnation.source] = incarnation
+        if before is not None:
+            self._network.withdraw(before, self)
+        self._network.claim(incarnation, self)
+
+    def incarnations(self) -> list[Incarnation]:
+        return self._network.incarnations()
+
+    def members(self) -> list[Member]:
+        return sorted(self._network.members)
+
+    def conflicts(self) -> list[str]:
+        return self.gate.conflicts()
 
     def subscribe(
         self,
@@ -91,10 +138,13 @@ class MemoryBus:
         on_gap: Callable[[str, int], None],
         history: int = 0,
     ) -> None:
-        if history:
-            self._deliver_past(topic, deliver, history)
+        def receive(arrival: Arrival) -> None:
+            self.gate.put(arrival, deliver)
 
-        subscription = Subscription(topic, deliver)
+        if history:
+            self._deliver_past(topic, receive, history)
+
+        subscription = Subscription(topic, receive)
         self._network.subscribers.setdefault(topic, []).append(subscription)
         self._subscriptions.append(subscription)
 
@@ -136,6 +186,7 @@ class MemoryBus:
         ]
 
     def announce(self, member: Member) -> None:
+        self._module = member.module
         self._network.enter(member, self)
 
     def watch(self, on_change: Watcher) -> None:
@@ -151,4 +202,5 @@ class MemoryBus:
             self._network.servers.pop(self._served.pop(), None)
         while self._past_of:
             self._network.pasts.pop(self._past_of.pop(), None)
+        self.gate.close()
         self._network.leave(self)

@@ -15,8 +15,15 @@ from zenoh import ext
 from cogmap.bus.access.subjects import SUBJECTS
 from cogmap.bus.codec import Envelope, decode_envelope, encode
 from cogmap.bus.depth import cached_messages
-from cogmap.bus.discovery import Role, announce_use, identify
-from cogmap.bus.interface import Answer, Arrival, Job, Member, Past
+from cogmap.bus.discovery import Role, announce_use, identify, tokens
+from cogmap.bus.incarnations import (
+    UNNAMED,
+    Gate,
+    every_incarnation,
+    incarnation_key,
+    read_incarnation,
+)
+from cogmap.bus.interface import Answer, Arrival, Incarnation, Job, Member, Past
 from cogmap.bus.session import check_name, is_name, open_client, past_key, ready_key
 from cogmap.errors import MessageError, NoAnswerError
 from cogmap.schemas.topics import Delivery, Scope, Topic
@@ -43,6 +50,9 @@ _LARGE_BYTES = 8 * 2**20
 # takes twice as long while the thread that has published it computes on.
 BATCHED_BYTES = 2**17
 TRANSIT_S = 0.002
+# Whoever begins a new incarnation of a source in one process, as a player that begins anew, lets
+# what the one before has published arrive first: tokens overtake messages.
+SUCCESSION_S = 0.05
 
 
 class _Closable(Protocol):
@@ -75,6 +85,10 @@ class ZenohBus:
         self._is_named = False
         # Answers of many messages, which wait for a slow link: Zenoh's thread receives meanwhile.
         self._aside = ThreadPoolExecutor(1)
+        self._module = UNNAMED
+        self._claimed: dict[str, tuple[int, _Closable]] = {}
+        self._gate = Gate()
+        self._watches_incarnations = False
 
     @property
     def session(self) -> zenoh.Session:
@@ -120,9 +134,51 @@ class ZenohBus:
         )
 
     def publish(self, topic: Topic, payload: bytes, envelope: Envelope) -> None:
+        claimed = self._claimed.get(envelope.source)
+        if claimed is None or claimed[0] != envelope.incarnation:
+            self.claim(Incarnation(self._module, envelope.source, envelope.incarnation))
+
         self._publishers[topic].put(payload, attachment=encode(envelope))
         if len(payload) > BATCHED_BYTES:
             time.sleep(TRANSIT_S)
+
+    def claim(self, incarnation: Incarnation) -> None:
+        before = self._claimed.get(incarnation.source)
+        if before is not None:
+            time.sleep(SUCCESSION_S)
+            before[1].undeclare()
+
+        key = incarnation_key(self._agent, incarnation)
+        token = self._session.liveliness().declare_token(key)
+        self._claimed[incarnation.source] = (incarnation.number, token)
+
+    def incarnations(self) -> list[Incarnation]:
+        keys = tokens(self._session, every_incarnation(self._agent))
+        read = (read_incarnation(key) for key in keys)
+        return sorted({incarnation for incarnation in read if incarnation is not None})
+
+    def members(self) -> list[Member]:
+        return [_member(key) for key in tokens(self._session, self._every_ready)]
+
+    def conflicts(self) -> list[str]:
+        return self._gate.conflicts()
+
+    def _watch_incarnations(self) -> None:
+        """Learn which are there, before the first message comes."""
+        if self._watches_incarnations:
+            return
+
+        def changed(sample: zenoh.Sample) -> None:
+            incarnation = read_incarnation(str(sample.key_expr))
+            if incarnation is not None:
+                self._gate.note(incarnation, sample.kind == zenoh.SampleKind.PUT)
+
+        self._watches_incarnations = True
+        self._declared.append(
+            self._session.liveliness().declare_subscriber(
+                every_incarnation(self._agent), changed, history=True
+            )
+        )
 
     def subscribe(
         self,
@@ -133,10 +189,12 @@ class ZenohBus:
     ) -> None:
         def receive(sample: zenoh.Sample) -> None:
             now_ns = time.time_ns()
-            deliver(Arrival(topic, bytes(sample.payload), _envelope(sample), now_ns))
+            arrival = Arrival(topic, bytes(sample.payload), _envelope(sample), now_ns)
+            self._gate.put(arrival, deliver)
 
         if self._subject is not None:
             self._subject.check_subscribes(topic)
+        self._watch_incarnations()
         self._announce_use(Role.SUBSCRIBES, topic)
         key = topic.key(self._agent)
         if topic.delivery is not Delivery.NEVER_DROP:
@@ -268,25 +326,32 @@ class ZenohBus:
         if self._subject is not None:
             self._subject.check_is(member.module, member.instance)
         self._is_named = True
+        self._module = member.module
         self._declared.append(identify(self._session, self._agent, member))
 
     def watch(self, on_change: Callable[[Member, bool], None]) -> None:
         def changed(sample: zenoh.Sample) -> None:
-            *_, module, instance = str(sample.key_expr).split("/")
-            on_change(Member(module, instance), sample.kind == zenoh.SampleKind.PUT)
+            on_change(_member(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT)
 
-        every = ready_key(self._agent, Member("*", "*"))
         self._declared.append(
-            self._session.liveliness().declare_subscriber(every, changed, history=True)
+            self._session.liveliness().declare_subscriber(self._every_ready, changed, history=True)
         )
 
+    @property
+    def _every_ready(self) -> str:
+        return ready_key(self._agent, Member("*", "*"))
+
     def close(self) -> None:
+        self._gate.close()
         while self._declared:
             self._declared.pop().undeclare()
         while self._publishers:
             _, publisher = self._publishers.popitem()
             publisher.undeclare()
         self._aside.shutdown(cancel_futures=True)
+        while self._claimed:
+            _, (_, token) = self._claimed.popitem()
+            token.undeclare()
         self._session.close()  # type: ignore[no-untyped-call]
 
 
@@ -295,6 +360,12 @@ def encoding(topic: Topic) -> zenoh.Encoding:
     `application/msgpack;Odometry`.
     """
     return zenoh.Encoding(f"application/msgpack;{topic.type.__name__}")
+
+
+def _member(key: str) -> Member:
+    """Return the member that the key of a token names."""
+    *_, module, instance = key.split("/")
+    return Member(module, instance)
 
 
 def _priority(topic: Topic) -> zenoh.Priority:

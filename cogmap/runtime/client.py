@@ -11,6 +11,7 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.runtime import environment
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
+from cogmap.runtime.succession import is_single
 
 # How often it looks whether it is to end.
 IDLE_S = 0.05
@@ -49,7 +50,11 @@ class Client:
     def __enter__(self) -> Client:
         keys = environment.keys(*self._subjects)
         shell = Shell(self.module, ZenohBus(self._endpoint, self._agent, keys=keys))
-        shell.open()
+        try:
+            shell.open(is_single=is_single(self.module))
+        except BaseException:
+            shell.close()
+            raise
         self._ended.clear()
         self._thread = threading.Thread(target=self._work, args=(shell,), daemon=True)
         self._thread.start()

@@ -55,6 +55,7 @@ class Module:
     graph: Graph | None = None
     on_load: Callable[[], Reply] | None = None
     notes: Callable[[], list[str]] | None = None
+    heartbeats: frozenset[str] = frozenset()
     _next_seq: Counter[Topic] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:
@@ -100,6 +101,16 @@ class Module:
         self.requires = requires
         self.emits.update(emits)
         return self
+
+    def observing(
+        self, handler: Handler, heartbeats: Iterable[str] = (), emits: Iterable[Topic] = ()
+    ) -> Module:
+        """Learn who comes and goes by messages on presence, which it publishes for the log.
+
+        Those of the modules `heartbeats` count as present only while they report their health.
+        """
+        self.heartbeats = frozenset(heartbeats)
+        return self.on(topics.PRESENCE, handler, [topics.PRESENCE, *emits])
 
     def serve(self, request: Topic, reply: Topic, handler: Callable[[Any], Message]) -> Module:
         """Answer queries for `request` with a message of `reply`."""

@@ -23,6 +23,7 @@ from cogmap.runtime.state.journal import Journal
 from cogmap.runtime.state.outbox import Outbox
 from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.state.store import Store
+from cogmap.runtime.succession import is_single
 
 log = logging.getLogger("cogmap")
 # How often it looks whether it is asked to end.
@@ -130,7 +131,7 @@ def run_module(
     stop = Stop(tied)  # only now: until a router answers, a signal ends the process at once
     shell = Shell(module, bus, journal, counts=counts, store=store, outbox=outbox)
     try:
-        shell.open()
+        shell.open(is_single=is_single(module), is_asked_to_end=lambda: stop.asked)
         log.info("%s is ready", module.instance)
         is_alone = watch_company(bus, ends_with)
         while not stop.asked and not is_alone():

@@ -18,22 +18,25 @@ from cogmap.runtime.delivery.publisher import Computation, Publisher
 from cogmap.runtime.delivery.recovery import Recovery
 from cogmap.runtime.follower import Follower
 from cogmap.runtime.health import Meter
+from cogmap.runtime.heartbeats import Change, Heartbeats
 from cogmap.runtime.module import Module, Reply
 from cogmap.runtime.roster import Roster
 from cogmap.runtime.state.journal import Journal
 from cogmap.runtime.state.outbox import Outbox
 from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.state.store import Store
+from cogmap.runtime.succession import Place, take_place
 from cogmap.runtime.timers import Due, Timers
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta
-from cogmap.schemas.process import Presence
+from cogmap.schemas.process import Health, Presence
 
 log = logging.getLogger("cogmap")
 # How often health is published, and a graph that is behind or empty asked for again.
 HEALTH_PERIOD_NS = 1_000_000_000
 RETRY_PERIOD_NS = 500_000_000
+SILENCE_PERIOD_NS = 500_000_000
 START = "@start"
 TIMER = "@timer"
 OUTSIDE = "@outside"
@@ -70,6 +73,9 @@ class Shell:
         self._counts = counts
         self._health = health
         self._roster = Roster(module.requires)
+        self._heartbeats: Heartbeats | None = None
+        if health and module.heartbeats:
+            self._heartbeats = Heartbeats(module.heartbeats, time.monotonic())
         self._started = module.start is None
         self._follower: Follower | None = None
         if module.graph is not None:
@@ -81,14 +87,22 @@ class Shell:
         if self._follower is not None:
             follower = self._follower
             jobs.append((RETRY_PERIOD_NS, lambda now_ns: follower.retry()))
+        if self._heartbeats is not None:
+            jobs.append((SILENCE_PERIOD_NS, lambda now_ns: self._expire_heartbeats()))
         self._timers = Timers(jobs)
 
-    def open(self) -> None:
+    def open(
+        self, *, is_single: bool = False, is_asked_to_end: Callable[[], bool] = lambda: False
+    ) -> None:
         """Restore the journal, join the bus, and announce the module.
 
         What others publish once they see it announced arrives here. Raises UsageError if the
-        journal cannot be read.
+        journal cannot be read, or if another process has its name and stays or, of a module that
+        `is_single`, is of its module; and KeyboardInterrupt if it is asked to end while it waits
+        for that one to leave.
         """
+        place = Place(self.module, self.publisher.incarnation, is_single)
+        take_place(self.bus, place, is_asked_to_end)
         backfill: frozenset[topics.Topic] = frozenset()
         if self._journal is not None and self.module.restore is not None:
             self.module.restore(self._journal.messages())
@@ -100,6 +114,8 @@ class Shell:
             if topic is not topics.PRESENCE:
                 history = cached_messages(topic) if topic in backfill else 0
                 self.bus.subscribe(topic, self.inbox.put, _leave_to_numbers, history)
+        if self._heartbeats is not None and topics.HEALTH not in self.module.handlers:
+            self.bus.subscribe(topics.HEALTH, self.inbox.put, _leave_to_numbers)
         for request, (reply, handler) in self.module.served.items():
             answer = self._server(request, handler)
             self.bus.serve(request, reply, answer, self.inbox.call)
@@ -108,6 +124,9 @@ class Shell:
             self.publisher.send_restored(self._store)
         if self._follower is not None:
             self._follower.join()
+        if self._health:
+            # Whoever gives it work waits for a report.
+            self._publish_health(time.monotonic_ns())
         self.bus.announce(Member(self.module.name, self.module.instance))
         if self.module.requires or self._observes_presence:
             # Handled on the module's own thread.
@@ -173,6 +192,9 @@ class Shell:
             notes.append(f"{self.meter.faults} faults: run with --verbose to see them")
         if self.module.notes is not None:
             notes.extend(self.module.notes())
+        if self._heartbeats is not None:
+            notes.extend(self._heartbeats.notes(time.monotonic()))
+        notes.extend(self.bus.conflicts())
         return notes
 
     @property
@@ -185,6 +207,11 @@ class Shell:
         envelope = arrival.envelope
         if message is None or envelope is None:
             return
+        if self._heartbeats is not None and isinstance(message, Health):
+            member = Member(message.module, message.instance)
+            self._feed_presence(self._heartbeats.beat(member, time.monotonic()))
+            if topics.HEALTH not in self.module.handlers:
+                return
         follower = self._follower
         if (
             follower is not None
@@ -276,13 +303,24 @@ class Shell:
     def _on_presence(self, member: Member, alive: bool) -> None:
         self._roster.update(member, alive)
         if self._observes_presence:
-            self._feed_presence(member, alive)
+            changes = [(member, alive)]
+            if self._heartbeats is not None:
+                changes = self._heartbeats.note(member, alive, time.monotonic())
+            self._feed_presence(changes)
         if not self._started and not self.missing:
             self._started = True
             self._invoke(self._start, (START, self.module.instance, 0))
 
-    def _feed_presence(self, member: Member, alive: bool) -> None:
+    def _expire_heartbeats(self) -> None:
+        assert self._heartbeats is not None
+        self._feed_presence(self._heartbeats.expire(time.monotonic()))
+
+    def _feed_presence(self, changes: Iterable[Change]) -> None:
         """Publish what this module observed, for the log, and hand it to the module."""
+        for member, alive in changes:
+            self._feed_one(member, alive)
+
+    def _feed_one(self, member: Member, alive: bool) -> None:
         observed = Presence(
             module=member.module,
             instance=member.instance,

@@ -35,7 +35,13 @@ const incarnation = nowNs();
 const session = await Session.open(new Config(endpoint));
 const commands = await session.declarePublisher(`cogmap/${agent}/${COMMAND}`);
 const scans = await session.declareSubscriber(`cogmap/${agent}/${SCAN}`);
-await session.liveliness().declareToken(`cogmap/${agent}/@ready/motor/${INSTANCE}`);
+const tokens = [
+  `cogmap/${agent}/@incarnation/motor/${INSTANCE}/${incarnation}`,
+  `cogmap/${agent}/@ready/motor/${INSTANCE}`,
+];
+for (const token of tokens) {
+  await session.liveliness().declareToken(token);
+}
 
 const wanderer = new Wanderer();
 for await (const sample of scans.receiver()) {

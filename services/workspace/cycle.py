@@ -155,8 +155,11 @@ class Workspace:
         """Collect an answer.
 
         One that comes after its cycle has ended is committed now if it still applies. If it does
-        not, it is rejected, and the next delta counts it.
+        not, it is rejected, and the next delta counts it. Raises MessageError if the task was not
+        given to whoever answers it.
         """
+        self._dispatch.check_source(proposal)
+        self._lanes.check_source(proposal)
         if self._dispatch.answer(proposal) or self._lanes.answer(proposal):
             return self._continue_if_complete([])
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import msgspec
 
+from cogmap.errors import MessageError
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
 
@@ -15,6 +16,8 @@ from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
 BUSY = 1000
 MAX_ATTEMPTS = 5
 """Workers that a task is given to before it has failed: one that kills each must end."""
+MAX_GIVEN = 1024
+"""Tasks of which it is known to whom they were given, answered or not."""
 
 
 @dataclass
@@ -49,6 +52,7 @@ class Dispatch:
         self._background = background
         self._workers: set[str] = set()
         self._leases: dict[str, Lease] = {}
+        self._given: dict[str, set[str]] = {}
 
     def begin(self, tasks: list[Task], now_ns: int) -> list[Message]:
         """Add `tasks`; return what is to be published now. Without a worker they wait for one."""
@@ -85,6 +89,15 @@ class Dispatch:
             is_waiting = lease.is_open and not lease.worker
             if is_waiting:
                 lease.task = msgspec.structs.replace(lease.task, version=version)
+
+    def check_source(self, proposal: Proposal) -> None:
+        """Raise MessageError if the task that `proposal` answers was given to others alone."""
+        workers = self._given.get(proposal.task_id)
+        if workers is not None and proposal.source not in workers:
+            raise MessageError(
+                f"an answer of {proposal.source!r} to {proposal.task_id}, which was given to "
+                f"{', '.join(sorted(workers))}"
+            )
 
     def answer(self, proposal: Proposal) -> bool:
         """Take a proposal.
@@ -155,6 +168,12 @@ class Dispatch:
                 lease.worker = ""
                 lease.attempt += 1
 
+    def _note_given(self, lease: Lease) -> None:
+        given = self._given
+        given.setdefault(lease.task.task_id, set()).add(lease.worker)
+        if len(given) > MAX_GIVEN:
+            del given[next(iter(given))]
+
     def _assign(self, now_ns: int) -> list[Message]:
         """Assign open tasks: one message of all leases, then each task, so that a worker begins
         with the first while the others are on their way.
@@ -181,6 +200,7 @@ class Dispatch:
             worker = min(self._workers, key=lambda name: (name == lost_by, load[name], name))
             load[worker] += 1
             lease.worker = worker
+            self._note_given(lease)
             lease.until_ns = now_ns + self._lease_ns
             tasks.append(lease.task)
             assignment = Assignment(

@@ -10,7 +10,7 @@ from cogmap.runtime.module import Module
 from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas import topics
 from cogmap.services.workspace.config import Config
-from cogmap.services.workspace.cycle import Workspace
+from cogmap.services.workspace.cycle import WORKERS, Workspace
 
 __all__ = ["Config", "Workspace", "build"]
 
@@ -42,7 +42,7 @@ def build(
         topics.ROUTE_REPLAY,
     )
     return (
-        Module("workspace", instance, emits={topics.PRESENCE})
+        Module("workspace", instance)
         .on(topics.SELF_MOTION, workspace.on_motion, emits=published)
         .on(topics.SCAN, workspace.on_scan, emits=published)
         .on(topics.ENERGY, workspace.on_energy, emits=published)
@@ -51,7 +51,7 @@ def build(
         .on(topics.OFFER, workspace.on_offer, emits=published)
         .on(topics.COMPETITION, workspace.on_competition, emits=published)
         .on(topics.BROADCAST, workspace.on_broadcast, emits=published)
-        .on(topics.PRESENCE, workspace.on_presence, emits=published)
+        .observing(workspace.on_presence, heartbeats=[WORKERS], emits=published)
         .on(topics.CLOCK, workspace.on_clock, emits=published)
         .serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, workspace.snapshot)
         .journaling(

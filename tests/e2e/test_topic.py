@@ -156,9 +156,9 @@ def test_pub_is_obeyed(robot: Robot, endpoint: str) -> None:
     printed(endpoint, "topic", "pub", "-t", "2", "-r", "20", "motor/command", written)
 
     assert robot.got_command.wait(TIMEOUT_S)
-    assert robot.commands[0] == MotorCommand(
-        left_wheel_rad_s=1.5, right_wheel_rad_s=2.0, source="cli"
-    )
+    (command, *_) = robot.commands
+    assert (command.left_wheel_rad_s, command.right_wheel_rad_s) == (1.5, 2.0)
+    assert command.source.startswith("cli-")
 
 
 @pytest.mark.parametrize(

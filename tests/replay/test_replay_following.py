@@ -52,7 +52,11 @@ class Session:
         self._recorder.open()
 
     def restart_workspace(self) -> None:
-        """Start the workspace, with nothing in its graph."""
+        """Start the workspace, or start it anew, with nothing in its graph."""
+        if self._shells:
+            self._settle()
+            self._workspace.close()
+            self._shells.remove(self._workspace)
         self.graph = Graph()
         module = Module("workspace", emits={topics.DELTA})
         module.serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, self._snapshot)

@@ -28,7 +28,7 @@ class Inbox:
     def put(self, arrival: Arrival) -> None:
         """Enqueue; called from the bus's threads."""
         topic = arrival.topic
-        if topic.delivery is not Delivery.LATEST_WINS:
+        if topic.delivery is not Delivery.LATEST_WINS or arrival.refused:
             self._waiting.put(arrival)
             return
 

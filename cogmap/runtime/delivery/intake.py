@@ -5,17 +5,19 @@ from __future__ import annotations
 import logging
 import time
 from collections import Counter
-from dataclasses import dataclass, field
 
 from cogmap.bus.codec import UNKNOWN, Envelope, decode
 from cogmap.bus.interface import Arrival
 from cogmap.errors import MessageError
+from cogmap.runtime.delivery.numbers import MAX_JUMP, Numbers
 from cogmap.schemas.base import Message
 from cogmap.schemas.topics import Delivery, Topic
 
 log = logging.getLogger("cogmap")
 LOG_INTERVAL_S = 1.0
 _MAX_SENTENCE = 500
+MAX_INCARNATIONS = 4
+"""Lives of a source whose numbers are kept: one that was away may come back."""
 
 
 def number_of(envelope: Envelope | None) -> int | None:
@@ -27,41 +29,63 @@ def number_of(envelope: Envelope | None) -> int | None:
     return envelope.earlier + envelope.seq
 
 
-@dataclass
 class _Stream:
-    """The last message of one source on one topic, and the incarnations before its own."""
+    """What has come of one source on one topic, from one incarnation to the next."""
 
-    last: Envelope
-    ended: set[int] = field(default_factory=set)
+    def __init__(self, first: Envelope) -> None:
+        self._last = first
+        self._numbers = {first.incarnation: Numbers(first.seq)}
+
+    @property
+    def number(self) -> int | None:
+        """Return the greatest number among all that the source published; None if it does not count
+        them.
+        """
+        last = self._last
+        if last.earlier == UNKNOWN:
+            return None
+        return last.earlier + self._numbers[last.incarnation].last
 
     def before(self, envelope: Envelope) -> range:
-        """Return the numbers between the last message and `envelope`, none if they are unknown."""
-        last = number_of(self.last)
+        """Return the numbers between the greatest and that of `envelope`: none if they are unknown,
+        or too many to be believed.
+        """
+        is_earlier = envelope.incarnation in self._numbers
+        is_present = envelope.incarnation == self._last.incarnation
+        greatest = self.number
         number = number_of(envelope)
-        if last is None or number is None or envelope.incarnation in self.ended:
+        if greatest is None or number is None or (is_earlier and not is_present):
             return range(0)
-        return range(last + 1, number)
+        if number - greatest > MAX_JUMP:
+            return range(0)
+        return range(greatest + 1, number)
 
     def advance(self, envelope: Envelope) -> int:
-        """Make `envelope` the last one. Returns how many messages are missing before it.
+        """Take account of `envelope`. Returns how many more messages are missing because of it.
 
-        Raises MessageError if it is not newer.
+        Raises MessageError if its number came before, or cannot be believed yet.
         """
-        last = self.last
-        if envelope.incarnation in self.ended:
-            raise MessageError(f"number {envelope.seq} of {envelope.source} is of an earlier run")
-
-        if envelope.incarnation == last.incarnation:
-            if envelope.seq <= last.seq:
-                raise MessageError(f"number {envelope.seq} of {envelope.source} came twice")
-            missing = envelope.seq - last.seq - 1
-        else:
-            self.ended.add(last.incarnation)
-            awaited = self.before(envelope)
-            missing = max(0, awaited.stop - awaited.start)
-
-        self.last = envelope
+        numbers = self._numbers.get(envelope.incarnation)
+        missing = self._begin(envelope) if numbers is None else numbers.add(envelope.seq)
+        self._last = envelope
         return missing
+
+    def resume(self, envelope: Envelope) -> None:
+        """Go on from `envelope`, which was received before this process was started."""
+        self._numbers[envelope.incarnation] = Numbers(envelope.seq)
+        self._forget_oldest()
+        self._last = envelope
+
+    def _begin(self, envelope: Envelope) -> int:
+        """Begin an incarnation. Returns how many messages of those before never came."""
+        missing = self.before(envelope)
+        self._numbers[envelope.incarnation] = Numbers(envelope.seq)
+        self._forget_oldest()
+        return max(0, missing.stop - missing.start)
+
+    def _forget_oldest(self) -> None:
+        if len(self._numbers) > MAX_INCARNATIONS:
+            del self._numbers[next(iter(self._numbers))]
 
 
 class Intake:
@@ -92,6 +116,8 @@ class Intake:
                 raise MessageError(f"{topic.name}: no envelope")
             if (envelope.source, envelope.seq) != (message.source, message.seq):
                 raise MessageError(f"{topic.name}: envelope and message name different sources")
+            if arrival.refused:
+                raise MessageError(f"{topic.name}: {arrival.refused}")
             if topic.delivery is Delivery.NEVER_DROP:
                 self._follow(topic, envelope)
         except MessageError as error:
@@ -114,17 +140,17 @@ class Intake:
 
     def resume(self, topic: Topic, envelope: Envelope) -> None:
         """Go on from a message of `topic` that was received before this process was started."""
-        before = self._streams.get((topic, envelope.source))
-        stream = _Stream(envelope)
-        if before is not None:
-            stream.ended = before.ended | {before.last.incarnation} - {envelope.incarnation}
-        self._streams[topic, envelope.source] = stream
+        stream = self._streams.get((topic, envelope.source))
+        if stream is None:
+            self._streams[topic, envelope.source] = _Stream(envelope)
+        else:
+            stream.resume(envelope)
 
     def received_up_to(self) -> dict[tuple[Topic, str], int]:
         """Return the number of the last message of each source on each topic, among all that it has
         published there; without the sources that do not count them.
         """
-        numbers = {key: number_of(stream.last) for key, stream in self._streams.items()}
+        numbers = {key: stream.number for key, stream in self._streams.items()}
         return {key: number for key, number in numbers.items() if number is not None}
 
     def count_lost(self, topic: str, number: int) -> None:
@@ -141,7 +167,9 @@ class Intake:
         self._log(topic, f"rejected {reason}")
 
     def _follow(self, topic: Topic, envelope: Envelope) -> None:
-        """Notice what is missing before a message. Raises MessageError if it is not newer."""
+        """Notice what is missing before a message. Raises MessageError for one that came before,
+        or whose number cannot be believed yet.
+        """
         stream = self._streams.get((topic, envelope.source))
         if stream is None:
             self._streams[topic, envelope.source] = _Stream(envelope)
@@ -150,7 +178,9 @@ class Intake:
         try:
             missing = stream.advance(envelope)
         except MessageError as error:
-            raise MessageError(f"{topic.name}: {error}") from None
+            raise MessageError(
+                f"{topic.name}: number {envelope.seq} of {envelope.source} {error}"
+            ) from None
         if missing:
             self._missing[topic.name] += missing
             self._count_gaps(topic.name)
@@ -160,10 +190,12 @@ class Intake:
         missing = self._missing[topic]
         given_up = self._given_up[topic]
         lost = max(missing, given_up)
-
         new = lost - self.gaps[topic]
-        if new > 0:
+        if lost:
             self.gaps[topic] = lost
+        else:
+            self.gaps.pop(topic, None)
+        if new > 0:
             self._log(topic, f"{topic}: {new} lost")
 
     def _log(self, topic: str, sentence: str) -> None:

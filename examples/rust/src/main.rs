@@ -57,6 +57,12 @@ fn run(endpoint: &str, agent: &str) -> Result<(), Box<dyn Error + Send + Sync>> 
     let scans = session
         .declare_subscriber(format!("cogmap/{agent}/{SCAN}"))
         .wait()?;
+    let _started = session
+        .liveliness()
+        .declare_token(format!(
+            "cogmap/{agent}/@incarnation/motor/{INSTANCE}/{incarnation}"
+        ))
+        .wait()?;
     let _ready = session
         .liveliness()
         .declare_token(format!("cogmap/{agent}/@ready/motor/{INSTANCE}"))

@@ -94,7 +94,12 @@ class Desk:
             self.presence(worker)
 
     def feed(self, message: Message) -> list[Message]:
-        """Let the workspace receive `message`, as it would come off a bus."""
+        """Let the workspace receive `message`, as it would come off a bus; an answer without a
+        source is that of whoever holds the task.
+        """
+        if isinstance(message, Proposal) and message.task_id in self._leases:
+            holder = self._leases[message.task_id].worker
+            message = msgspec.structs.replace(message, source=message.source or holder)
         published = self.module.feed(received(message))
         self.published += published
         self._unread += published

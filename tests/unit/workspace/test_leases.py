@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 
+import msgspec
 import pytest
 
+from cogmap.errors import MessageError
 from cogmap.runtime.run import REAL_TIME
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.nodes import NEVER_NS, Self
@@ -97,6 +99,29 @@ def test_a_lost_workers_task_is_given_to_another_and_committed_once() -> None:
     desk.feed(answer(asked, [_moved_self(0, 7.0)]))
     assert _committed(desk, asked) == 1
     assert desk.agent.x_m == 1.0
+
+
+def test_an_answer_of_whom_a_task_was_not_given_to_is_refused_and_changes_nothing() -> None:
+    desk = Desk("w1", "w2")
+    desk.see(0)
+    (asked,) = desk.take()
+    forged = msgspec.structs.replace(answer(asked, [_moved_self(0, 7.0)]), source="stranger")
+
+    with pytest.raises(MessageError, match="an answer of 'stranger' to 1/localization, which was"):
+        desk.feed(forged)
+    desk.feed(answer(asked, [_moved_self(0)]))
+
+    assert desk.agent.x_m == 1.0
+
+
+def test_a_late_answer_of_a_stranger_is_refused_too() -> None:
+    desk, asked = _missed_deadline()
+    forged = msgspec.structs.replace(answer(asked, [_moved_self(0, 7.0)]), source="stranger")
+
+    with pytest.raises(MessageError, match="'stranger'"):
+        desk.feed(forged)
+
+    assert desk.feed(answer(asked, [_moved_self(0)]))
 
 
 def test_a_worker_that_goes_without_a_task_changes_nothing() -> None:
