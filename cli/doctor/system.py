@@ -42,6 +42,7 @@ def examine(expected: Iterable[str], observed: Observed, system: System) -> list
         *complaints(observed),
         *(finding for _, finding in refused if finding not in too_old),
         *(moment.slow_machine(observed, late) or late),
+        *contradictions(system),
         *truth_leaks(modules, system),
     ]
 
@@ -150,6 +151,20 @@ def rates_hz(reports_of: Iterable[list[Health]]) -> dict[str, float]:
             published = number - first.emitted.get(name, 0)
             rates[name] = rates.get(name, 0.0) + published / span_s
     return rates
+
+
+def contradictions(system: System) -> Iterator[Finding]:
+    """Yield a finding for each topic that several processes publish and one alone may."""
+    for topic in topics.ALL:
+        publishing = system.doing(Role.PUBLISHES, topic)
+        if topic.shared or len(publishing) < 2:
+            continue
+        names = ", ".join(process.name for process in publishing)
+        yield Finding(
+            topic.name,
+            f"{names} publish it, and contradict each other",
+            "end all but one of them",
+        )
 
 
 def truth_leaks(expected: Iterable[str], system: System) -> Iterator[Finding]:

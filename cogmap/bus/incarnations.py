@@ -20,7 +20,9 @@ from cogmap.bus.interface import Arrival, Incarnation
 log = logging.getLogger("cogmap")
 
 HOLD_S = 1.0
-"""How long a message waits for its source's token, which takes another way than it."""
+"""How long a message waits for its source's token, which takes another way than it; and how long
+one of the incarnation before is still accepted, which its successor's token has overtaken.
+"""
 MAX_HELD = 4096
 MAX_HELD_BYTES = 64 * 2**20
 """How much may wait; the history of a few topics, of 1,024 messages each, fits."""
@@ -79,14 +81,26 @@ def when(number: int) -> str:
 class _Source:
     """The incarnations of a source that are on the bus, in the order in which they were seen, and
     the one that counts: until it `is_heard` the oldest, and then that one for as long as it stays.
+    What that of `before` has sent counts until `before_until_s`.
     """
 
     current: int
     present: list[int] = field(default_factory=list)
     is_heard: bool = False
+    before: int | None = None
+    before_until_s: float = 0.0
 
-    def note(self, number: int, alive: bool) -> None:
-        """Take account of an incarnation that came or left, and decide which one counts."""
+    def accepts(self, number: int, now_s: float) -> bool:
+        """Decide whether a message of that incarnation counts."""
+        if number == self.current:
+            self.is_heard = True
+            return True
+        return number == self.before and now_s <= self.before_until_s
+
+    def note(self, number: int, alive: bool, until_s: float) -> None:
+        """Take account of an incarnation that came or left, and decide which one counts. What one
+        that has a successor now has sent counts until `until_s`.
+        """
         if alive and number not in self.present:
             self.present.append(number)
         if not alive and number in self.present:
@@ -94,16 +108,24 @@ class _Source:
         if not self.present:
             return
 
+        chosen = self.current
         if not self.is_heard:
-            self.current = min(self.present)
+            chosen = min(self.present)
         elif self.current not in self.present:
-            self.current = self.present[0]
-            self.is_heard = False
+            chosen = self.present[0]
+        if chosen == self.current:
+            return
+
+        if self.current not in self.present:
+            self.before = self.current
+            self.before_until_s = until_s
+        self.current = chosen
+        self.is_heard = False
 
 
 @dataclass(slots=True)
 class _Held:
-    """A message that waits until `until_s` of the monotonic clock."""
+    """A message that waits until `until_s` of the gate's clock."""
 
     arrival: Arrival
     deliver: Deliver
@@ -113,12 +135,12 @@ class _Held:
 class Gate:
     """Delivers what a source's present incarnation publishes, in order.
 
-    A message of another one waits `hold_s` for the token that states it. It is delivered then or,
+    A message of another one waits HOLD_S for the token that states it. It is delivered then or,
     if none came, as `refused`, with the reason. Any thread may call it.
     """
 
-    def __init__(self, hold_s: float = HOLD_S) -> None:
-        self._hold_s = hold_s
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
         self._sources: dict[str, _Source] = {}
         self._held: deque[_Held] = deque()
         self._held_bytes = 0
@@ -134,8 +156,7 @@ class Gate:
 
         with self._lock:
             source = self._sources.get(envelope.source)
-            if source is not None and source.current == envelope.incarnation:
-                source.is_heard = True
+            if source is not None and source.accepts(envelope.incarnation, self._clock()):
                 deliver(arrival)
             elif self._has_room(arrival):
                 self._hold(arrival, deliver)
@@ -148,7 +169,7 @@ class Gate:
         number = incarnation.number
         with self._lock:
             source = self._sources.setdefault(name, _Source(number))
-            source.note(number, alive)
+            source.note(number, alive, self._clock() + HOLD_S)
             if alive and len(source.present) > 1:
                 log.warning("%s", _conflict(name, source))
             if not alive:
@@ -172,9 +193,10 @@ class Gate:
                 self._timer.cancel()
                 self._timer = None
 
-    def expire(self, now_s: float) -> None:
-        """Deliver as refused what has waited until `now_s` of the monotonic clock."""
+    def expire(self) -> None:
+        """Deliver as refused what has waited in vain."""
         with self._lock:
+            now_s = self._clock()
             while self._held and self._held[0].until_s <= now_s:
                 held = self._held.popleft()
                 self._held_bytes -= len(held.arrival.payload)
@@ -185,20 +207,20 @@ class Gate:
         return len(self._held) < MAX_HELD and size_bytes <= MAX_HELD_BYTES
 
     def _hold(self, arrival: Arrival, deliver: Deliver) -> None:
-        self._held.append(_Held(arrival, deliver, time.monotonic() + self._hold_s))
+        self._held.append(_Held(arrival, deliver, self._clock() + HOLD_S))
         self._held_bytes += len(arrival.payload)
         if self._timer is None:
             self._start_timer()
 
     def _start_timer(self) -> None:
-        left_s = max(0.0, self._held[0].until_s - time.monotonic())
+        left_s = max(0.0, self._held[0].until_s - self._clock())
         self._timer = threading.Timer(left_s, self._on_timer)
         self._timer.daemon = True
         self._timer.start()
 
     def _on_timer(self) -> None:
         with self._lock:
-            self.expire(time.monotonic())
+            self.expire()
             self._timer = None
             if self._held:
                 self._start_timer()

@@ -50,9 +50,6 @@ _LARGE_BYTES = 8 * 2**20
 # takes twice as long while the thread that has published it computes on.
 BATCHED_BYTES = 2**17
 TRANSIT_S = 0.002
-# Whoever begins a new incarnation of a source in one process, as a player that begins anew, lets
-# what the one before has published arrive first: tokens overtake messages.
-SUCCESSION_S = 0.05
 
 
 class _Closable(Protocol):
@@ -145,7 +142,6 @@ class ZenohBus:
     def claim(self, incarnation: Incarnation) -> None:
         before = self._claimed.get(incarnation.source)
         if before is not None:
-            time.sleep(SUCCESSION_S)
             before[1].undeclare()
 
         key = incarnation_key(self._agent, incarnation)

@@ -16,7 +16,7 @@ log = logging.getLogger("cogmap")
 
 TIMEOUT_S = 12.0
 """Whoever was killed has left at once; whose link was lost, after Zenoh's lease of 10 s."""
-POLL_S = 0.1
+POLL_S = 0.05
 
 
 def is_single(module: Module) -> bool:

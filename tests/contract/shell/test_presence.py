@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cogmap.bus.codec import decode
 from cogmap.bus.interface import Member
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
@@ -9,7 +10,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.process import Presence
 from cogmap.schemas.sensing import Odometry
 from cogmap.testing import odometry
-from tests.support.system.networks import Network, spin_until
+from tests.support.system.networks import Network, Peer, spin_until
 
 COUNT = 20
 
@@ -80,4 +81,30 @@ def test_a_module_that_observes_presence_learns_who_comes_and_goes(network: Netw
     came, went = (presence for presence in observed if presence.module == "codelets")
     assert (came.instance, came.alive) == ("codelets-1", True)
     assert (went.instance, went.alive) == ("codelets-1", False)
+    shell.close()
+
+
+def test_a_worker_that_is_only_a_token_leaves_for_the_module_and_for_the_log(
+    network: Network,
+) -> None:
+    observed: list[Presence] = []
+    module = Module("workspace").observing(observed.append, heartbeats=["codelets"])
+    shell = Shell(module, network.join())
+    recorded = Peer(network.join(), topics.PRESENCE)
+    shell.open()
+    worker = Shell(Module("codelets", "codelets-1"), network.join())
+    worker.open()
+    network.join().announce(Member("codelets", "ghost"))
+
+    def of(instance: str) -> list[bool]:
+        return [each.alive for each in observed if each.instance == instance]
+
+    spin_until(lambda: of("ghost") == [True, False], shell, worker)
+    ghostly = "codelets/ghost is on the bus and has reported no health at all"
+    assert any(note.startswith(ghostly) for note in shell.notes)
+    assert of("codelets-1") == [True]
+
+    arrivals = recorded.take(len(observed))
+    assert [decode(topics.PRESENCE, each.payload) for each in arrivals] == observed
+    worker.close()
     shell.close()

@@ -57,6 +57,19 @@ def observed(*reports: Health, clock_rate: float | None = 1.0) -> Observed:
     return Observed({SENSORY}, by_instance, clock_rate)
 
 
+def test_two_publishers_of_a_topic_that_one_alone_may_publish_are_named() -> None:
+    second = Process("2", Member("sensory", "sensory-2"))
+    uses = [Use(topics.SCAN.name, Role.PUBLISHES, each) for each in (Process("1", SENSORY), second)]
+    on = System("agent", (Process("1", SENSORY), second), tuple(uses))
+
+    found = findings(observed(health(1.0), health(2.0), health(3.0)), on)
+
+    assert found == [
+        "sensory/scan: sensory, sensory-2 publish it, and contradict each other: "
+        "end all but one of them"
+    ]
+
+
 def test_a_system_that_is_well_has_no_findings() -> None:
     well = observed(health(10), health(11), health(12))
 
