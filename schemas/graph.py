@@ -122,7 +122,8 @@ class Delta(Message, kw_only=True, frozen=True):
     are in it.
 
     `rejected` counts the answers since the delta before that are in none; `reasons` are those of
-    the first few.
+    the first few. At the end of a cycle `lineage` is a digest of all commits before this one: a
+    replica of another lineage has received what the workspace did not commit.
     """
 
     version: Count
@@ -132,10 +133,13 @@ class Delta(Message, kw_only=True, frozen=True):
     operations: list[Operation]
     rejected: Count = 0
     reasons: list[str] = []
+    lineage: Name | msgspec.UnsetType = msgspec.UNSET
 
 
 class Snapshot(Message, kw_only=True, frozen=True):
-    """The whole graph at `version`, in the course of `cycle` after its phase `phase`."""
+    """The whole graph at `version`, in the course of `cycle` after its phase `phase`; `lineage` is
+    a digest of all commits that it was made by.
+    """
 
     version: Count
     cycle: Count
@@ -144,6 +148,7 @@ class Snapshot(Message, kw_only=True, frozen=True):
     nodes: list[AnyNode]
     links: list[Links]
     tiles: list[PlaceTile]
+    lineage: Name | msgspec.UnsetType = msgspec.UNSET
 
 
 class SnapshotRequest(Message, kw_only=True, frozen=True):

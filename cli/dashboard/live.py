@@ -31,6 +31,7 @@ from cogmap.runtime import config, environment
 from cogmap.runtime.config import Sections
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.delivery.plausibility import Plausibility
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Offer
@@ -163,7 +164,7 @@ class Connection:
     def __init__(self, bus: ZenohBus) -> None:
         self._bus = bus
         self._inbox = Inbox()
-        self._intake = Intake()
+        self._intake = Intake(Plausibility())
         self._numbers: Counter[Topic] = Counter()
         self._incarnation = time.time_ns()
         self._name = f"{DASHBOARD}-{os.getpid()}"

@@ -78,7 +78,7 @@ def observe(bus: ZenohBus, duration_s: float) -> Observed:
 
     psutil.cpu_percent()  # from here on the next call measures
     bus.watch(on_change)
-    for topic in (topics.HEALTH, topics.CLOCK, topics.MOTOR_COMMAND):
+    for topic in (topics.HEALTH, topics.CLOCK, topics.PAUSED, topics.MOTOR_COMMAND):
         bus.subscribe(topic, inbox.put, intake.count_lost)
 
     end_s = time.monotonic() + duration_s

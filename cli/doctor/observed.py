@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from cogmap.bus.interface import Member
 from cogmap.schemas.base import Message
-from cogmap.schemas.process import Clock, Health
+from cogmap.schemas.process import Clock, Health, Paused
 from cogmap.schemas.sensing import MotorCommand, SpeedLimit
 
 
@@ -17,7 +17,7 @@ class Observed:
     was received.
 
     `busy` is the share of this machine's processors that were computing. So many of the `commands`
-    were `limited` by the age of their poses.
+    were `limited` by the age of their poses. `is_paused` is whether time stands by a wish.
     """
 
     ready: set[Member] = field(default_factory=set)
@@ -27,6 +27,7 @@ class Observed:
     busy: float = 0.0
     commands: int = 0
     limited: int = 0
+    is_paused: bool = False
 
     def note(self, member: Member, alive: bool) -> None:
         """Take account of a member that is there, or has left."""
@@ -44,6 +45,8 @@ class Observed:
                 self.health.setdefault(health.instance, []).append(health)
             case Clock() as clock:
                 self.clock_rate = clock.rate
+            case Paused() as paused:
+                self.is_paused = paused.is_paused
             case MotorCommand() as command:
                 self.commands += 1
                 self.limited += SpeedLimit.POSE_AGE in {command.halted_by, command.slowed_by}

@@ -35,7 +35,8 @@ def examine(expected: Iterable[str], observed: Observed, system: System) -> list
     rates = [] if registry.PLAYER in modules else wrong_rates(observed, system)
     refused = list(rejections(observed))
     too_old = [finding for name, finding in refused if name == topics.MOTOR_COMMAND.name]
-    late = [*silent(modules, observed), *growing_queues(observed), *rates, *too_old]
+    still = standing(modules, observed)
+    late = [*silent(modules, observed), *growing_queues(observed), *rates, *too_old, *still]
     return [
         *absent(modules, observed),
         *not_ready(observed),
@@ -101,6 +102,16 @@ def rejections(observed: Observed) -> Iterator[tuple[str, Finding]]:
             if number:
                 wrong = f"it rejected {number} messages of {name}"
                 yield name, Finding(instance, wrong, "its log names them: correct their publisher")
+
+
+def standing(expected: Iterable[str], observed: Observed) -> Iterator[Finding]:
+    """Yield a finding if the robot was commanded nothing, and nobody had asked that time stands."""
+    if "motor" in expected and not observed.commands and not observed.is_paused:
+        yield Finding(
+            "motor",
+            "it commanded nothing while I looked",
+            "see what others refuse or wait for: their findings here, their logs",
+        )
 
 
 def growing_queues(observed: Observed) -> Iterator[Finding]:

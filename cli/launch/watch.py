@@ -15,6 +15,7 @@ from cogmap.cli.launch.tally import FOLLOWED, Tally
 from cogmap.graph.replica import Replica, snapshot_over
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.delivery.plausibility import Plausibility
 from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.topics import Topic
@@ -30,7 +31,7 @@ class Watch:
         self.present: set[Member] = set()
         self._bus = bus
         self._inbox = Inbox()
-        self._intake = Intake()
+        self._intake = Intake(Plausibility())
 
         self._published: Counter[Topic] = Counter()
         self._incarnation = time.time_ns()

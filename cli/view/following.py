@@ -16,6 +16,7 @@ from cogmap.recording.exporting.moments import OF_MIND, Drive, Moment
 from cogmap.recording.log import Entry
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.delivery.plausibility import Plausibility
 from cogmap.runtime.process import Stop, give_way
 from cogmap.schemas.base import Message
 from cogmap.schemas.topics import Topic
@@ -30,7 +31,7 @@ class Following:
 
     def __init__(self, bus: Bus, senses: tuple[Topic, ...]) -> None:
         self._inbox = Inbox()
-        self._intake = Intake()
+        self._intake = Intake(Plausibility())
         self._begin_ns = time.time_ns()
         replica = Replica(snapshot_over(bus))
         self._drive = Drive(replica.graph, replica.follow)

@@ -7,8 +7,10 @@ from collections.abc import Callable, Iterator
 from operator import attrgetter
 from typing import Any, TypeVar
 
+import msgspec
+
 from cogmap.bus.codec import encode
-from cogmap.graph import decay
+from cogmap.graph import decay, lineage
 from cogmap.graph.links import LinkIndex
 from cogmap.graph.places import Place, PlaceGrid
 from cogmap.schemas.graph import (
@@ -46,7 +48,7 @@ class Graph:
     `phase` is that of the newest commit that was not late, in cognitive cycle `cycle`. Nodes are
     shared and never changed: a commit replaces them. All nodes of an indexed kind are found without
     a search. A replica that needs no place nodes, the bulk of what changes, leaves them out by
-    `with_places`.
+    `with_places`. `lineage` is a digest of all commits; None after a snapshot that states none.
     """
 
     def __init__(self, with_places: bool = True) -> None:
@@ -54,6 +56,7 @@ class Graph:
         self.cycle = 0
         self.phase = Phase.END
         self.decay = Decay()
+        self.lineage: str | None = lineage.FIRST
 
         self.nodes: dict[str, AnyNode] = {}
         self.links = LinkIndex(self._name_of)
@@ -80,6 +83,10 @@ class Graph:
             return False
 
         self.change(delta.operations)
+        if self.lineage is None and delta.lineage is not msgspec.UNSET:
+            self.lineage = delta.lineage
+        if self.lineage is not None:
+            self.lineage = lineage.after(self.lineage, delta)
         self.version = delta.version
         self.cycle = delta.cycle
         if delta.phase is not Phase.LATE:
@@ -185,6 +192,7 @@ class Graph:
             nodes=nodes,
             links=list(self.links.in_bulk()),
             tiles=list(self.places.messages()),
+            lineage=self.lineage or msgspec.UNSET,
         )
 
     def load(self, snapshot: Snapshot) -> None:
@@ -196,13 +204,14 @@ class Graph:
             names.clear()
 
         self.change([snapshot.decay, *snapshot.nodes, *snapshot.links, *snapshot.tiles])
+        self.lineage = snapshot.lineage or None
         self.version = snapshot.version
         self.cycle = snapshot.cycle
         self.phase = snapshot.phase
 
     def digest(self) -> str:
         """Return a hash of the content: two graphs are equal if and only if their digests are."""
-        content = encode(self.snapshot())
+        content = encode(msgspec.structs.replace(self.snapshot(), lineage=msgspec.UNSET))
         return hashlib.blake2b(content, digest_size=16).hexdigest()
 
     def _name_of(self, identifier: str) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import msgspec
+
 from cogmap.bus.codec import decode, encode
 from cogmap.bus.interface import Bus
 from cogmap.errors import MessageError, NoAnswerError
@@ -14,6 +16,8 @@ from cogmap.schemas.graph import Delta, Snapshot, SnapshotRequest
 
 # For those that only watch; a module that follows the graph waits longer.
 SNAPSHOT_TIMEOUT_S = 2.0
+# Some cycles: what is published in the place of a delta comes soon after it.
+REMEMBERED_DELTAS = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,11 +33,13 @@ Fetch = Callable[[SnapshotRequest], Fetched]
 
 
 class Replica:
-    """Applies deltas to `graph` in order of their version.
+    """Applies deltas to `graph` in order of their version, those of the workspace's instance alone.
 
-    Where a delta is missing, or the workspace was restarted, the graph stays at its version
-    (`is_behind`) until `fetch` returns a snapshot; `mended` counts those. `on_load` is called with
-    each snapshot that replaced the graph.
+    Where a delta is missing, the workspace was restarted, or the graph is a fork of the
+    workspace's, it stays at its version (`is_behind`) until `fetch` returns a snapshot: `mended`
+    counts those, `forks` how many of them replaced a fork, and `untrue` how many showed that a
+    version was announced that the workspace does not have. `on_load` is called with each snapshot
+    that replaced the graph.
     """
 
     def __init__(
@@ -44,36 +50,46 @@ class Replica:
     ) -> None:
         self.graph = Graph() if graph is None else graph
         self.mended = 0
+        self.forks = 0
+        self.untrue = 0
         self.is_behind = False
         self.has_joined = False
+        self.source = ""
 
         self._fetch = fetch
         self._on_load = on_load
         self._incarnation: int | None = None
         self._ended: set[int] = set()
         self._wanted_version = 0
+        self._applied: dict[int, int] = {}
 
-    def join(self) -> None:
-        """Load the graph as it is now. It stays empty if no workspace answers: join again then,
-        unless a delta has come since.
+    def join(self) -> bool:
+        """Load the graph as it is now. Returns whether a workspace answers: if none does, the graph
+        stays empty, so join again then, unless a delta has come since.
         """
         try:
             fetched = self._fetch(SnapshotRequest())
         except NoAnswerError:
-            return
+            return False
 
         self.has_joined = True
+        self.source = fetched.source
         self._incarnation = fetched.incarnation
         if fetched.snapshot.version > 0:
             self._load(fetched)
+        return True
+
+    def is_strange(self, delta: Delta) -> bool:
+        """Decide whether a delta is of another source than the graph."""
+        return bool(self.source) and delta.source != self.source
 
     def follow(self, delta: Delta, incarnation: int | None = None) -> bool:
         """Apply `delta`, published by that incarnation of the workspace.
 
         Returns true if the graph holds it: false if a snapshot is needed and none was to be had, or
-        if the delta is of an incarnation that has ended.
+        if the delta is of another source, or of an incarnation that has ended.
         """
-        if incarnation in self._ended:
+        if incarnation in self._ended or self.is_strange(delta):
             return False
 
         if self._is_other(incarnation):
@@ -82,6 +98,9 @@ class Replica:
         elif delta.version > self.graph.version + 1:
             self.is_behind = True
             self._wanted_version = max(self._wanted_version, delta.version - 1)
+        elif self._is_fork(delta):
+            self.forks += 1
+            self.is_behind = True
 
         if self.is_behind and not self.mend():
             return False
@@ -91,22 +110,29 @@ class Replica:
                 self._ended.add(incarnation)
             return False
 
+        self.source = delta.source
         self._incarnation = incarnation
         self.has_joined = True
-        self.graph.apply(delta)
+        if self.graph.apply(delta):
+            self._note(delta)
         return self.graph.version >= delta.version
 
     def mend(self) -> bool:
-        """Load a snapshot that is new enough. Returns whether there was one."""
+        """Load a snapshot. Returns whether there was one.
+
+        The workspace answers after all that it has published: a snapshot that is older than a delta
+        shows that the delta is not the workspace's.
+        """
         try:
-            fetched = self._fetch(SnapshotRequest(at_least=self._wanted_version))
+            fetched = self._fetch(SnapshotRequest())
         except NoAnswerError:
-            return False
-        if fetched.snapshot.version < self._wanted_version:
             return False
 
         if self._is_other(fetched.incarnation) and self._incarnation is not None:
             self._ended.add(self._incarnation)
+        elif fetched.snapshot.version < self._wanted_version:
+            self.untrue += 1
+        self.source = fetched.source
         self._incarnation = fetched.incarnation
         self._load(fetched)
         self.mended += 1
@@ -120,7 +146,24 @@ class Replica:
             return False
         return incarnation != self._incarnation
 
+    def _is_fork(self, delta: Delta) -> bool:
+        """Decide whether the workspace published another delta in the place of one that was
+        applied: by its number, or because it has another lineage.
+        """
+        graph = self.graph
+        if delta.version <= graph.version:
+            return self._applied.get(delta.version, delta.seq) != delta.seq
+
+        is_stated = graph.lineage is not None and delta.lineage is not msgspec.UNSET
+        return is_stated and delta.lineage != graph.lineage
+
+    def _note(self, delta: Delta) -> None:
+        self._applied[delta.version] = delta.seq
+        if len(self._applied) > REMEMBERED_DELTAS:
+            del self._applied[next(iter(self._applied))]
+
     def _load(self, fetched: Fetched) -> None:
+        self._applied.clear()
         self.graph.load(fetched.snapshot)
         if self._on_load is not None:
             self._on_load(fetched)

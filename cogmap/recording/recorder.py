@@ -127,7 +127,7 @@ class Recorder:
         self._queue = WriteQueue(limit_bytes)
         now_ns = time.time_ns()
         continues_ns = began_ns(after, now_ns)
-        self._intake = Intake(continues_ns)
+        self._intake = Intake(since_ns=continues_ns)
         self._recovery = Recovery(bus, self._intake)
         self._after = after
         self._fetched: Counter[str] = Counter()

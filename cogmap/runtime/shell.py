@@ -14,6 +14,7 @@ from cogmap.errors import MessageError
 from cogmap.graph.replica import Fetched
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
+from cogmap.runtime.delivery.plausibility import Plausibility
 from cogmap.runtime.delivery.publisher import Computation, Publisher
 from cogmap.runtime.delivery.recovery import Recovery
 from cogmap.runtime.follower import Follower
@@ -64,7 +65,8 @@ class Shell:
         self.module = module
         self.bus = bus
         self.inbox = Inbox()
-        self.intake = Intake()
+        self.plausibility = Plausibility()
+        self.intake = Intake(self.plausibility)
         self.meter = Meter(module)
         self.publisher = Publisher(module, bus, journal, counts, store, outbox=outbox)
         self._recovery = Recovery(bus, self.intake)
@@ -190,6 +192,7 @@ class Shell:
         notes = [] if self._follower is None else self._follower.notes()
         if self.meter.faults:
             notes.append(f"{self.meter.faults} faults: run with --verbose to see them")
+        notes.extend(self.plausibility.notes())
         if self.module.notes is not None:
             notes.extend(self.module.notes())
         if self._heartbeats is not None:
@@ -212,17 +215,24 @@ class Shell:
             self._feed_presence(self._heartbeats.beat(member, time.monotonic()))
             if topics.HEALTH not in self.module.handlers:
                 return
-        follower = self._follower
-        if (
-            follower is not None
-            and isinstance(message, Delta)
-            and not follower.follow(message, envelope.incarnation)
-        ):
+        if isinstance(message, Delta) and not self._follows(message, envelope.incarnation):
             return
 
         self.publisher.trace(message.stamp_ns, envelope)
         cause = (arrival.topic.name, envelope.source, envelope.seq)
         self._invoke(lambda: self.module.answers(message), cause, True, received_ns)
+
+    def _follows(self, delta: Delta, incarnation: int) -> bool:
+        """Apply a delta to the graph that the module follows, if any. Returns whether it is to be
+        handed to the module.
+        """
+        if self._follower is None:
+            return True
+        try:
+            return self._follower.follow(delta, incarnation)
+        except MessageError as error:
+            self.intake.reject(topics.DELTA.name, str(error))
+            return False
 
     def _invoke(
         self,

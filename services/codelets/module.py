@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from cogmap.errors import MessageError
 from cogmap.graph.graph import Graph
@@ -15,7 +16,7 @@ from cogmap.services.codelets.config import Config
 
 __all__ = ["Config", "Worker", "build"]
 
-# A bound on tasks that wait: other workers do most of them, and deltas drop what is done.
+# A bound on tasks and leases that wait: others do most of them, and deltas drop what is done.
 MAX_WAITING = 1024
 
 
@@ -38,9 +39,7 @@ class Worker:
         """Keep a task until it is leased, or the graph has reached its version."""
         self._tasks.pop(task.task_id, None)
         self._tasks[task.task_id] = task
-        if len(self._tasks) > MAX_WAITING:
-            oldest = next(iter(self._tasks))
-            del self._tasks[oldest]
+        _limit(self._tasks)
 
         return self._run_ready()
 
@@ -52,6 +51,7 @@ class Worker:
             else:
                 self._leases.pop(assignment.task_id, None)
 
+        _limit(self._leases)
         return self._run_ready()
 
     def on_delta(self, delta: Delta) -> list[Proposal]:
@@ -105,6 +105,13 @@ class Worker:
             events=answer.events,
             failure=failure,
         )
+
+
+def _limit(waiting: dict[str, Any]) -> None:
+    """Leave out the oldest of more than MAX_WAITING."""
+    while len(waiting) > MAX_WAITING:
+        oldest = next(iter(waiting))
+        del waiting[oldest]
 
 
 def build(instance: str, codelets: Iterable[ConfiguredCodelet]) -> Module:

@@ -76,7 +76,7 @@ class GlobalWorkspace:
         self._received.append(key)
 
         contenders = self._decay(max(0, coalitions.stamp_ns - self._now_ns))
-        self._now_ns = max(self._now_ns, coalitions.stamp_ns)
+        self._be_at(coalitions.stamp_ns)
         for coalition in coalitions.coalitions:
             codelet = coalition.codelet
             before = self._candidates.get(codelet)
@@ -113,6 +113,13 @@ class GlobalWorkspace:
             silence=silence,
         )
         return [*published, competition]
+
+    def _be_at(self, now_ns: int) -> None:
+        """Let it be `now_ns`. Where time goes back, nothing has happened later than that."""
+        self._now_ns = now_ns
+        self._new_ns = min(self._new_ns, now_ns)
+        if self._broadcast_ns is not None:
+            self._broadcast_ns = min(self._broadcast_ns, now_ns)
 
     def _decay(self, passed_ns: int) -> list[Contender]:
         """Take off activation for the time that passed; those that have none left."""

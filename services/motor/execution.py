@@ -46,9 +46,12 @@ class Execution:
         self._executed = program
 
     def put(self, action: Action) -> None:
-        """Keep an action until it counts. Raises MessageError if it has no motor program."""
+        """Keep an action until it counts; none that waits is of a later cycle. Raises MessageError
+        if it has no motor program.
+        """
         if action.scheme:
             self._program_of(action.action, action.parameters)
+        self._actions = [each for each in self._actions if each.cycle <= action.cycle]
         self._actions.append(action)
 
     def started(self, answered_cycle: int, waiting_cycle: int | None) -> list[MotorProgram]:

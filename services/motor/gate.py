@@ -18,8 +18,9 @@ class LockstepGate:
         self._unanswered: set[int] = set()
 
     def on_competition(self, competition: Competition) -> None:
-        """Note how far the global workspace has come."""
+        """Note how far the global workspace has come: there is no later cycle than this."""
         self._competition_cycle = competition.cycle
+        self._unanswered = {each for each in self._unanswered if each <= competition.cycle}
         if competition.trigger and competition.cycle > self._action_cycle:
             self._unanswered.add(competition.cycle)
 

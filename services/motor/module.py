@@ -67,7 +67,7 @@ class MotorModule:
         self._is_resumed = False
         self._has_joined = False
         self._clear_m = math.inf
-        self._newest_ns = 0
+        self._newest_ns: dict[topics.Topic, int] = {}
         self._waiting: Estimate | None = None
         self._answered: MotorCommand | None = None
         self._answered_cycle = 0
@@ -87,7 +87,7 @@ class MotorModule:
 
     def on_clock(self, clock: Clock) -> MotorCommand | None:
         """Stop the robot, once, when its newest pose has become too old."""
-        self._newest_ns = max(self._newest_ns, clock.stamp_ns)
+        self._newest_ns[topics.CLOCK] = clock.stamp_ns
         last = self._answered
         if last is None or last.halted_by or self._waiting is not None:
             return None
@@ -104,7 +104,7 @@ class MotorModule:
         if motion.stamp_ns > self._gate.motion_ns:
             self._near.on_motion(motion)
         self._gate.motion_ns = motion.stamp_ns
-        self._newest_ns = max(self._newest_ns, motion.stamp_ns)
+        self._newest_ns[topics.SELF_MOTION] = motion.stamp_ns
 
         return self._replies()
 
@@ -112,8 +112,9 @@ class MotorModule:
         """Measure how far it is free ahead.
 
         In lockstep a repeated scan is answered at once: by the command for the pose that waits, by
-        a halt if no pose has come since a restart, or by the last offer, which the next cycle waits
-        for and may have lost.
+        In lockstep a repeated scan is answered at once: by the command for the pose that waits, by
+        that which answered its view already, by a halt if no pose has come since a restart, or by
+        the last offer, which the next cycle waits for and may have lost.
         """
         self._clear_m = obstacle_ahead_m(scan)
         is_repeated = scan.stamp_ns == self._gate.scan_ns
@@ -121,10 +122,13 @@ class MotorModule:
             self._near.on_scan(scan)
 
         self._gate.scan_ns = scan.stamp_ns
-        self._newest_ns = max(self._newest_ns, scan.stamp_ns)
+        self._newest_ns[topics.SCAN] = scan.stamp_ns
 
-        has_no_pose = self._answered is None and self._waiting is None
-        if is_repeated and self._is_lockstep and has_no_pose:
+        answered = self._answered
+        is_unheard = is_repeated and self._is_lockstep
+        if answered is not None and is_unheard and answered.stamp_ns == scan.stamp_ns:
+            return [answered]
+        if answered is None and is_unheard and self._waiting is None:
             command = self._remember(halted(scan.stamp_ns, SpeedLimit.NO_POSE))
             return [*self._offers(command), command]
 
@@ -278,8 +282,11 @@ class MotorModule:
         return command
 
     def _age_ns(self, stamp_ns: int) -> int:
-        """Compute a stamp's age by the newest message; 0 in lockstep, where time waits."""
-        return 0 if self._is_lockstep else max(0, self._newest_ns - stamp_ns)
+        """Compute a stamp's age by the last clock, self-motion and scan: none of them counts
+        after the next one comes; 0 in lockstep, where time waits.
+        """
+        newest_ns = max(self._newest_ns.values(), default=0)
+        return 0 if self._is_lockstep else max(0, newest_ns - stamp_ns)
 
 
 def build(config: Config, instance: str, run: Run = REAL_TIME) -> Module:

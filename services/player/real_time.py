@@ -51,7 +51,7 @@ class RealTime:
 
     def on_command(self, command: MotorCommand) -> None:
         """Note that a view was answered."""
-        self._answered_ns = max(self._answered_ns, command.stamp_ns)
+        self._answered_ns = command.stamp_ns
 
     def on_pause(self, pause: Pause) -> list[Message]:
         """Return whether time stands now."""

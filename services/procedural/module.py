@@ -82,13 +82,14 @@ class ProceduralMemory:
         return self._due()
 
     def on_broadcast(self, broadcast: Broadcast) -> list[Behaviours]:
-        """Bring behaviours to mind, as soon as all is there. After a restart, broadcasts come
-        again that were answered already.
+        """Bring behaviours to mind, as soon as all is there; no broadcast that waits is of a later
+        cycle. After a restart, broadcasts come again that were answered already.
         """
         if broadcast.cycle <= self._resumed_cycle:
             return []
 
         self._resumed_cycle = -1
+        self._waiting = [each for each in self._waiting if each.cycle <= broadcast.cycle]
         self._waiting.append(broadcast)
         return self._due()
 

@@ -51,7 +51,8 @@ class SensoryMemory:
     come, whichever of the two comes first, so the output does not depend on how they interleave. A
     newer frame replaces a waiting one; the motion then covers both, so none is lost. The view comes
     first: perception begins with it while the motion is still being measured. The last frame,
-    published again, gets the same answer again.
+    published again, gets the same answer again. An older one is ignored, but two in succession show
+    that time has gone back.
     """
 
     def __init__(self, config: Config) -> None:
@@ -69,6 +70,7 @@ class SensoryMemory:
         self._waiting: StereoFrame | None = None
         self._last_ns: int | None = None
         self._last_frame_ns: int | None = None
+        self._was_older = False
         self._answer: list[Message] = []
 
     def on_frame(self, frame: StereoFrame) -> Iterable[Message]:
@@ -78,12 +80,19 @@ class SensoryMemory:
         rectification(frame.calibration)
         self._odometry.check_near(frame.stamp_ns, "frame")
 
-        if self._last_ns is not None and frame.stamp_ns <= self._last_ns:
-            return self._answer if frame.stamp_ns == self._last_ns else []
+        if frame.stamp_ns == self._last_ns:
+            return self._answer
 
-        if self._waiting is None or frame.stamp_ns > self._waiting.stamp_ns:
-            self._waiting = frame
+        is_older = self._last_ns is not None and frame.stamp_ns < self._last_ns
+        is_back = is_older and self._was_older
+        self._was_older = is_older
+        if is_back:
+            self._last_ns = None
+            self._last_frame_ns = None
+        elif is_older:
+            return []
 
+        self._waiting = frame
         return self._emit()
 
     def on_odometry(self, odometry: Odometry) -> Iterable[Message]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import msgspec
 
 from cogmap.errors import MessageError
+from cogmap.graph import lineage
 from cogmap.graph.graph import Graph
 from cogmap.runtime.codelet import CycleContext
 from cogmap.schemas.codelets import Offer, Proposal
@@ -40,6 +41,7 @@ class Ledger:
         """Restore what was committed before."""
         if isinstance(past, Snapshot):
             self.graph.load(past)
+            self.graph.lineage = self.graph.lineage or lineage.FIRST
             self._written.clear()
             self._written_before = past.version
         elif self.graph.apply(past):
@@ -57,6 +59,7 @@ class Ledger:
 
         It has the number of answers rejected since the delta before, and the reasons.
         """
+        before = self.graph.lineage if phase is Phase.END else None
         delta = Delta(
             stamp_ns=stamp_ns,
             version=self.graph.version + 1,
@@ -66,6 +69,7 @@ class Ledger:
             operations=operations,
             rejected=self._rejected,
             reasons=self._reasons,
+            lineage=before or msgspec.UNSET,
         )
         self._rejected = 0
         self._reasons = []

@@ -19,7 +19,7 @@ from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
 from cogmap.services.workspace.association.individuals import Individuals, as_entered
 from cogmap.services.workspace.commit import Ledger, coalitions_of
 from cogmap.services.workspace.config import Config
-from cogmap.services.workspace.dispatch import MAX_ATTEMPTS, Dispatch
+from cogmap.services.workspace.dispatch import MAX_ATTEMPTS, Dispatch, check_holder
 from cogmap.services.workspace.forgetting import Forgetting
 from cogmap.services.workspace.ingress import (
     check_percepts,
@@ -30,13 +30,11 @@ from cogmap.services.workspace.ingress import (
 from cogmap.services.workspace.lane import Lanes
 from cogmap.services.workspace.learning.base_level import learned_operations
 from cogmap.services.workspace.learning.consciousness import Consciousness
-from cogmap.services.workspace.offers import Offers
+from cogmap.services.workspace.offers import OFFERING, Offers
 from cogmap.services.workspace.senses import Sensed
 
 WORKERS = "codelets"
 COMPETITION = "global_workspace"
-OFFERING = ("memory", "motor")
-"""The modules that make an offer in each cycle of lockstep, perhaps of nothing."""
 # Tasks of cycles before whose answers are still taken: a bound, for some are never answered.
 MAX_LATE_TASKS = 256
 PHASES = (Phase.CORRECTION, Phase.LOCALIZATION, Phase.OBJECTS, Phase.ATTENTION)
@@ -74,9 +72,11 @@ class Workspace:
         self._is_repeated = False
         self._context: CycleContext | None = None
         self._phase = 0
-        self._late: dict[str, None] = {}
+        self._late: dict[str, set[str]] = {}
         self._now_ns = 0
         self._begun_ns = -1
+        self._was_older = False
+        self._late_views = 0
 
     def restore(self, past: Iterable[Message]) -> None:
         """Restore the graph as it was left.
@@ -105,6 +105,12 @@ class Workspace:
             )
         return msgspec.structs.replace(graph.snapshot(), stamp_ns=max(0, self._begun_ns))
 
+    def notes(self) -> list[str]:
+        """Return what its health reports in words."""
+        if not self._late_views:
+            return []
+        return [f"{self._late_views} times percepts were older than those before them"]
+
     def on_motion(self, motion: SelfMotion) -> list[Message]:
         """Keep what moved until a cycle moves the self node by it."""
         self._sensed.put_motion(motion, self._moved_until_ns)
@@ -124,30 +130,48 @@ class Workspace:
         """Begin a cycle with the view's percepts, as soon as the one before has ended.
 
         In lockstep percepts that are repeated while they wait begin it without the competition of
-        the cycle before, which was lost with a process that was killed.
+        the cycle before, which was lost with a process that was killed. While a cycle runs they
+        have its tasks given once more, and those of one that ended without moving the self node
+        begin another. Older ones are ignored, but two in succession show that time has gone back:
+        as where a simulation begins anew, or where those before were of a time that is not true.
         """
         check_percepts(percepts)
-        is_past = percepts.stamp_ns <= self._begun_ns
-        if is_past and not self._is_interrupted(percepts):
+        if self._is_late(percepts):
+            return []
+        waiting = self._waiting
+        is_waiting = waiting is not None and waiting.stamp_ns == percepts.stamp_ns
+        is_again = percepts.stamp_ns == self._begun_ns
+        if self._context is not None and (is_again or is_waiting):
+            return self._repeat()
+        has_moved = self._moved_until_ns >= self._begun_ns
+        if is_again and has_moved and not self._is_interrupted(percepts):
             return []
 
-        waiting = self._waiting
-        self._is_repeated = waiting is not None and waiting.stamp_ns == percepts.stamp_ns
+        self._is_repeated = is_again or is_waiting
         self._waiting = percepts
         return self._begin()
 
     def on_competition(self, competition: Competition) -> list[Message]:
-        """Note that a competition for consciousness has ended."""
+        """Note that a competition for consciousness has ended. Raises MessageError if its cycle
+        has not begun.
+        """
+        self._check_begun(competition)
         self._consciousness.on_competition(competition)
         return self._begin()
 
     def on_broadcast(self, broadcast: Broadcast) -> list[Message]:
-        """Keep what is conscious until the next cycle learns from it."""
+        """Keep what is conscious until the next cycle learns from it. Raises MessageError if its
+        cycle has not begun.
+        """
+        self._check_begun(broadcast)
         self._consciousness.on_broadcast(broadcast)
         return self._begin()
 
     def on_offer(self, offer: Offer) -> list[Message]:
-        """Keep an offer until the next cycle begins."""
+        """Keep an offer until the next cycle begins. Raises MessageError if it is of a cycle that
+        has not begun, or one too many.
+        """
+        self._check_begun(offer)
         self._offers.put(offer)
         return self._begin()
 
@@ -155,17 +179,17 @@ class Workspace:
         """Collect an answer.
 
         One that comes after its cycle has ended is committed now if it still applies. If it does
-        not, it is rejected, and the next delta counts it. Raises MessageError if the task was not
-        given to whoever answers it.
+        not, it is rejected, and the next delta counts it. Raises MessageError if its task was never
+        given to who answers it.
         """
-        self._dispatch.check_source(proposal)
-        self._lanes.check_source(proposal)
         if self._dispatch.answer(proposal) or self._lanes.answer(proposal):
             return self._continue_if_complete([])
 
-        if proposal.task_id not in self._late:
+        holders = self._late.get(proposal.task_id)
+        if holders is None:
             return []
 
+        check_holder(proposal, holders)
         del self._late[proposal.task_id]
         if not self._ledger.validate([proposal]):
             return []
@@ -183,6 +207,7 @@ class Workspace:
 
     def on_presence(self, presence: Presence) -> list[Message]:
         """Note that a worker came or went; the cycle continues without a task that has failed."""
+        self._offers.presence(presence.instance, presence.alive)
         if presence.module != WORKERS:
             return []
 
@@ -233,6 +258,40 @@ class Workspace:
             return -1
         return agent.stamp_ns
 
+    def _check_begun(self, message: Competition | Broadcast | Offer) -> None:
+        """Raise MessageError if a message is of a cycle that has not begun: nobody can know more
+        of it than the workspace.
+        """
+        cycle = self._ledger.graph.cycle
+        if message.cycle > cycle:
+            name = type(message).__name__.lower()
+            raise MessageError(
+                f"{name} of {message.source} is of cycle {message.cycle}, and the newest is {cycle}"
+            )
+
+    def _is_late(self, percepts: Percepts) -> bool:
+        """Decide whether percepts are ignored: older than those of the last cycle, and the first
+        that are.
+        """
+        was_older = self._was_older
+        self._was_older = percepts.stamp_ns < self._begun_ns
+        if not self._was_older or was_older:
+            return False
+
+        self._late_views += 1
+        return True
+
+    def _repeat(self) -> list[Message]:
+        """Give the tasks of the cycle that runs once more, in lockstep: its view is shown again
+        because nothing came of it.
+        """
+        if not self._is_lockstep:
+            return []
+        published: list[Message] = []
+        for dispatch in [self._dispatch, *self._lanes.dispatches()]:
+            published += dispatch.repeat(self._now_ns)
+        return published
+
     def _is_interrupted(self, percepts: Percepts) -> bool:
         """Decide whether those are the percepts of a cycle that ended before its last phase."""
         if self._context is not None or percepts.stamp_ns != self._begun_ns:
@@ -264,7 +323,7 @@ class Workspace:
             ended = [self._ledger.commit(max(0, self._begun_ns), graph.cycle, Phase.END, [])]
         cycle = graph.cycle
         is_known = self._is_repeated or self._consciousness.complete(cycle)
-        if not is_known or not self._offers.complete(cycle):
+        if not is_known or not self._offers.complete(cycle, self._is_repeated):
             return ended
         return [*ended, *self._begin_cycle(percepts)]
 
@@ -339,7 +398,7 @@ class Workspace:
         """Commit the answers of the current phase; unanswered tasks may be answered later."""
         self._reject_failed(self._dispatch.failed)
         answers, unanswered = self._dispatch.collect()
-        self._late |= {task.task_id: None for task in unanswered}
+        self._late |= {lease.task.task_id: lease.holders for lease in unanswered}
         while len(self._late) > MAX_LATE_TASKS:
             del self._late[next(iter(self._late))]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import msgspec
 
@@ -16,15 +16,14 @@ from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
 BUSY = 1000
 MAX_ATTEMPTS = 5
 """Workers that a task is given to before it has failed: one that kills each must end."""
-MAX_GIVEN = 1024
-"""Tasks of which it is known to whom they were given, answered or not."""
 
 
 @dataclass
 class Lease:
     """A task, and the worker that holds it until `until_ns`; `worker` is empty while none does.
 
-    `lost_by` is the worker that held it before, `attempt` the number of workers that lost it.
+    `lost_by` is the worker that held it before, `attempt` the number of workers that lost it, and
+    `holders` are all to whom it was given: of any of them the first answer counts.
     """
 
     task: Task
@@ -33,6 +32,7 @@ class Lease:
     lost_by: str = ""
     attempt: int = 0
     proposal: Proposal | None = None
+    holders: set[str] = field(default_factory=set)
 
     @property
     def is_open(self) -> bool:
@@ -52,7 +52,6 @@ class Dispatch:
         self._background = background
         self._workers: set[str] = set()
         self._leases: dict[str, Lease] = {}
-        self._given: dict[str, set[str]] = {}
 
     def begin(self, tasks: list[Task], now_ns: int) -> list[Message]:
         """Add `tasks`; return what is to be published now. Without a worker they wait for one."""
@@ -72,15 +71,29 @@ class Dispatch:
         return self._assign(now_ns)
 
     def expire(self, now_ns: int) -> list[Message]:
-        """Give tasks whose lease has ended to another worker; they stay if there is no other."""
+        """Give tasks whose lease has ended to another worker; they stay if there is no other. A
+        lease ends at most as long from now as one that begins.
+        """
 
         def has_ended(lease: Lease) -> bool:
+            lease.until_ns = min(lease.until_ns, now_ns + self._lease_ns)
             if now_ns <= lease.until_ns:
                 return False
             others = self._workers - {lease.worker}
             return bool(others)
 
         self._revoke(has_ended)
+        return self._assign(now_ns)
+
+    def repeat(self, now_ns: int) -> list[Message]:
+        """Give every open task once more, to another worker if there is one: whoever held it may
+        never have received it. It counts as no attempt, since the worker may only be slow.
+        """
+        for lease in self._leases.values():
+            if lease.is_open and lease.worker:
+                lease.lost_by = lease.worker
+                lease.worker = ""
+
         return self._assign(now_ns)
 
     def refresh(self, version: int) -> None:
@@ -90,24 +103,17 @@ class Dispatch:
             if is_waiting:
                 lease.task = msgspec.structs.replace(lease.task, version=version)
 
-    def check_source(self, proposal: Proposal) -> None:
-        """Raise MessageError if the task that `proposal` answers was given to others alone."""
-        workers = self._given.get(proposal.task_id)
-        if workers is not None and proposal.source not in workers:
-            raise MessageError(
-                f"an answer of {proposal.source!r} to {proposal.task_id}, which was given to "
-                f"{', '.join(sorted(workers))}"
-            )
-
     def answer(self, proposal: Proposal) -> bool:
         """Take a proposal.
 
-        False if none is expected: the task was answered before, or is of another time.
+        False if none is expected: the task was answered before, or is of another time. Raises
+        MessageError if the task was never given to who answers it.
         """
         lease = self._leases.get(proposal.task_id)
         if lease is None or not lease.is_open:
             return False
 
+        check_holder(proposal, lease.holders)
         lease.proposal = proposal
         return True
 
@@ -135,13 +141,13 @@ class Dispatch:
 
         return names
 
-    def collect(self) -> tuple[list[Proposal], list[Task]]:
-        """Take out the answers, in the order of the tasks, and the tasks without one."""
+    def collect(self) -> tuple[list[Proposal], list[Lease]]:
+        """Take out the answers, in the order of the tasks, and the leases of those without one."""
         answers = []
         unanswered = []
         for lease in self._leases.values():
             if lease.proposal is None:
-                unanswered.append(lease.task)
+                unanswered.append(lease)
             else:
                 answers.append(lease.proposal)
 
@@ -167,12 +173,6 @@ class Dispatch:
                 lease.lost_by = lease.worker
                 lease.worker = ""
                 lease.attempt += 1
-
-    def _note_given(self, lease: Lease) -> None:
-        given = self._given
-        given.setdefault(lease.task.task_id, set()).add(lease.worker)
-        if len(given) > MAX_GIVEN:
-            del given[next(iter(given))]
 
     def _assign(self, now_ns: int) -> list[Message]:
         """Assign open tasks: one message of all leases, then each task, so that a worker begins
@@ -200,7 +200,7 @@ class Dispatch:
             worker = min(self._workers, key=lambda name: (name == lost_by, load[name], name))
             load[worker] += 1
             lease.worker = worker
-            self._note_given(lease)
+            lease.holders.add(worker)
             lease.until_ns = now_ns + self._lease_ns
             tasks.append(lease.task)
             assignment = Assignment(
@@ -215,3 +215,12 @@ class Dispatch:
             return []
         stamp_ns = max(task.stamp_ns for task in tasks)
         return [Leases(stamp_ns=stamp_ns, assignments=assignments), *tasks]
+
+
+def check_holder(proposal: Proposal, holders: set[str]) -> None:
+    """Raise MessageError if the task was never given to who answers it."""
+    if proposal.source not in holders:
+        raise MessageError(
+            f"{proposal.task_id} was answered by {proposal.source}, "
+            f"but given to {', '.join(sorted(holders)) or 'nobody yet'}"
+        )

@@ -38,11 +38,6 @@ class Lanes:
 
         return published
 
-    def check_source(self, proposal: Proposal) -> None:
-        """Raise MessageError if the task that `proposal` answers was given to others alone."""
-        for dispatch in self.dispatches():
-            dispatch.check_source(proposal)
-
     def answer(self, proposal: Proposal) -> bool:
         """Give a proposal to the lane whose task it answers; return whether there is one."""
         return any(dispatch.answer(proposal) for dispatch in self.dispatches())

@@ -42,7 +42,7 @@ def build(
         topics.ROUTE_REPLAY,
     )
     return (
-        Module("workspace", instance)
+        Module("workspace", instance, emits={topics.PRESENCE}, notes=workspace.notes)
         .on(topics.SELF_MOTION, workspace.on_motion, emits=published)
         .on(topics.SCAN, workspace.on_scan, emits=published)
         .on(topics.ENERGY, workspace.on_energy, emits=published)

@@ -4,18 +4,25 @@ scans and what the body senses of itself.
 
 from __future__ import annotations
 
+from typing import TypeVar
+
 import numpy as np
 
 from cogmap.errors import MessageError
 from cogmap.runtime.codelet import CycleContext
 from cogmap.runtime.run import Run
 from cogmap.schemas.array import Array
+from cogmap.schemas.base import Message
 from cogmap.schemas.nodes import ENERGY, Need, need_id
 from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
 
+M = TypeVar("M", bound=Message)
 # Speed, turn rate, duration, and the standard deviations of the two speeds.
 SELF_MOTION_COLUMNS = 5
-# Bounds: those of the last three seconds, at five views a second.
+# Bounds: all self-motion that is to be had after a restart; what else came in the last three
+# seconds, at five views a second. The first that came is left out, not the earliest: stamps that
+# lie ahead would stay.
+MAX_MOTIONS = 1024
 MAX_SCANS = 16
 MAX_ENERGIES = 16
 MAX_SCAN_AGE_NS = 100_000_000
@@ -31,8 +38,8 @@ class SelfMotions:
         self._motions: list[SelfMotion] = []
 
     def put(self, motion: SelfMotion, moved_ns: int) -> None:
-        """Keep self-motion, once, if it is newer than `moved_ns`. Raises MessageError if its rows
-        are of another shape or dtype.
+        """Keep self-motion, once, if it is newer than `moved_ns`, and none that is later. Raises
+        MessageError if its rows are of another shape or dtype.
         """
         shape = motion.motions.shape
         dtype = motion.motions.dtype
@@ -40,10 +47,12 @@ class SelfMotions:
         if dtype != "<f8" or not has_columns:
             raise MessageError(f"self-motion of shape {shape} and dtype {dtype}")
 
+        self._motions = [known for known in self._motions if known.stamp_ns <= motion.stamp_ns]
         stamps_ns = [known.stamp_ns for known in self._motions]
         is_new = motion.stamp_ns > moved_ns and motion.stamp_ns not in stamps_ns
         if is_new:
             self._motions.append(motion)
+            self._motions = self._motions[-MAX_MOTIONS:]
 
     def newest_ns(self) -> int:
         """Return until when the motion is known; -1 if none is kept."""
@@ -102,9 +111,7 @@ class Scans:
         if scan.stamp_ns == self._missed_ns:
             raise MessageError("a range scan came after its view's cycle had begun without it")
 
-        self._scans[scan.stamp_ns] = scan
-        while len(self._scans) > MAX_SCANS:
-            del self._scans[min(self._scans)]
+        _put_last(self._scans, scan, MAX_SCANS)
 
     def has(self, stamp_ns: int) -> bool:
         """Decide whether the cycle of the view at `stamp_ns` waits for its scan no longer."""
@@ -135,9 +142,7 @@ class Body:
 
     def put(self, energy: Energy) -> None:
         """Keep what was sensed with a view."""
-        self._sensed[energy.stamp_ns] = energy
-        while len(self._sensed) > MAX_ENERGIES:
-            del self._sensed[min(self._sensed)]
+        _put_last(self._sensed, energy, MAX_ENERGIES)
 
     def has(self, stamp_ns: int) -> bool:
         """Decide whether the cycle of the view at `stamp_ns` waits for its energy no longer."""
@@ -160,6 +165,14 @@ class Body:
             is_eased=energy.is_charging,
         )
         return [need]
+
+
+def _put_last(kept: dict[int, M], message: M, limit: int) -> None:
+    """Keep a message by its stamp, and leave out the first that came of more than `limit`."""
+    kept.pop(message.stamp_ns, None)
+    kept[message.stamp_ns] = message
+    while len(kept) > limit:
+        del kept[next(iter(kept))]
 
 
 class Sensed:

@@ -34,12 +34,18 @@ from tests.support.system.networks import (
 class Workspace:
     """Stands in for the workspace: the one that writes the graph, on a thread of its own."""
 
-    def __init__(self, network: Network, graph: Graph | None = None, answers: bool = True) -> None:
+    def __init__(
+        self,
+        network: Network,
+        graph: Graph | None = None,
+        answers: bool = True,
+        instance: str = "workspace",
+    ) -> None:
         self.graph = Graph() if graph is None else graph
         self._observer = network.join()
         # In memory a query is answered on the thread of whoever asks.
         self._changing = threading.Lock()
-        module = Module("workspace", emits={topics.DELTA})
+        module = Module("workspace", instance, emits={topics.DELTA})
         if answers:
             module.serve(topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, self._snapshot)
         self.shell = Shell(module, network.join(), health=False)
@@ -59,7 +65,7 @@ class Workspace:
     def running(self, *others: Shell) -> Iterator[None]:
         """Run it; it answers, and what it publishes reaches the others, from now on."""
         with working(self.shell):
-            await_members(self._observer, Member("workspace", "workspace"))
+            await_members(self._observer, Member("workspace", self.shell.module.instance))
             meet(self.shell.bus, *(other.bus for other in others))
             yield
 
@@ -251,6 +257,45 @@ def test_a_workspace_that_restarts_is_followed(
 
     assert follower.agrees_with(after)
     assert len(follower.loads) == 1
+
+
+def test_deltas_of_another_source_are_refused_and_named(
+    network: Network, follower: Followed
+) -> None:
+    workspace = Workspace(network)
+    follower.shell.open()
+    stranger = network.join()
+    stranger.declare(topics.DELTA)
+    meet(stranger, follower.shell.bus)
+    with workspace.running(follower.shell):
+        workspace.commit(2)
+        follower.catch_up(workspace, 2)
+
+        forged = Delta(source="stranger", version=3, cycle=3, phase=Phase.OBJECTS, operations=[])
+        publish(stranger, forged)
+        spin_until(lambda: bool(follower.shell.intake.rejected), follower.shell)
+        workspace.commit(2)
+        follower.catch_up(workspace, 4)
+
+    assert follower.agrees_with(workspace)
+    assert follower.shell.intake.rejected == {"workspace/delta": 1}
+    assert follower.shell.notes == ["1 deltas came of another source than workspace"]
+
+
+def test_a_workspace_of_another_name_is_followed_once_the_first_is_gone(
+    network: Network, follower: Followed
+) -> None:
+    first = Workspace(network)
+    follower.shell.open()
+    with first.running(follower.shell):
+        first.commit(2)
+        follower.catch_up(first, 2)
+
+    second = Workspace(network, instance="workspace-2")
+    with second.running(follower.shell):
+        second.commit(3)
+        follower.catch_up(second, 3)
+        spin_until(lambda: follower.agrees_with(second), follower.shell)
 
 
 def test_a_delta_is_applied_before_any_later_message_is_received(network: Network) -> None:

@@ -61,7 +61,8 @@ class Session:
         seq = self._numbers[topic.name]
         self._numbers[topic.name] += 1
 
-        numbered = msgspec.structs.replace(message, source="everyone", seq=seq)
+        source = "w" if isinstance(message, Proposal) else "everyone"
+        numbered = msgspec.structs.replace(message, source=source, seq=seq)
         now_ns = 10**9 + self._numbers.total()
         envelope = Envelope(numbered.source, numbered.seq, 1, now_ns, now_ns)
         self.bus.publish(topic, encode(numbered), envelope)

@@ -10,6 +10,7 @@ from cogmap.bus.codec import UNKNOWN, Envelope, decode
 from cogmap.bus.interface import Arrival
 from cogmap.errors import MessageError
 from cogmap.runtime.delivery.numbers import MAX_JUMP, Numbers
+from cogmap.runtime.delivery.plausibility import Plausibility
 from cogmap.schemas.base import Message
 from cogmap.schemas.topics import Delivery, Topic
 
@@ -92,10 +93,13 @@ class Intake:
     """Decodes arrivals and counts, by topic, the received, the rejected and the lost (`gaps`).
 
     A source that began after `since_ns` is missing from its number 0 on; without that, nothing is
-    missing before the first message that comes.
+    missing before the first message that comes. With `plausibility` it refuses what cannot be true.
     """
 
-    def __init__(self, since_ns: int | None = None) -> None:
+    def __init__(
+        self, plausibility: Plausibility | None = None, *, since_ns: int | None = None
+    ) -> None:
+        self._plausibility = plausibility
         self._since_ns = since_ns
         self.received: Counter[str] = Counter()
         self.rejected: Counter[str] = Counter()
@@ -118,6 +122,8 @@ class Intake:
                 raise MessageError(f"{topic.name}: envelope and message name different sources")
             if arrival.refused:
                 raise MessageError(f"{topic.name}: {arrival.refused}")
+            if self._plausibility is not None:
+                self._plausibility.check(topic, message, time.monotonic_ns())
             if topic.delivery is Delivery.NEVER_DROP:
                 self._follow(topic, envelope)
         except MessageError as error:

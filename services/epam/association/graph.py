@@ -63,6 +63,10 @@ class AssociativeGraph:
         """Return the stamp of the last broadcast that was learned from, 0 before the first."""
         return self._updated_ns
 
+    def be_at(self, now_ns: int) -> None:
+        """Let it be `now_ns`: what was learned from was not conscious later than that."""
+        self._updated_ns = min(self._updated_ns, now_ns)
+
     def learn(
         self, names: list[str], stamp_ns: int, related: Mapping[str, str] | None = None
     ) -> None:

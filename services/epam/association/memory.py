@@ -43,11 +43,13 @@ class Primer:
 
     def on_competition(self, stamp_ns: int) -> None:
         """Note that the competition for the view of this stamp has ended."""
-        self._competition_ns = max(self._competition_ns, stamp_ns)
+        self._competition_ns = stamp_ns
 
     def on_broadcast(self, broadcast: Broadcast) -> None:
-        """Keep a broadcast until a view comes that it may prime."""
-        if broadcast.stamp_ns > self._graph.updated_ns:
+        """Keep a broadcast until a view comes that it may prime; none that waits is later."""
+        now_ns = broadcast.stamp_ns
+        self._waiting = [each for each in self._waiting if each.stamp_ns <= now_ns]
+        if now_ns > self._graph.updated_ns:
             self._waiting.append(broadcast)
 
     @property
@@ -59,6 +61,7 @@ class Primer:
         """Learn from the broadcasts that prime a view; return the graph from time to time."""
         until_ns = self._views_ns[0] if len(self._views_ns) == BEHIND else -1
         self._views_ns.append(view_ns)
+        self._graph.be_at(view_ns)
 
         due = [broadcast for broadcast in self._waiting if broadcast.stamp_ns <= until_ns]
         self._waiting = [each for each in self._waiting if each.stamp_ns > until_ns]

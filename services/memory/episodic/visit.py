@@ -52,7 +52,7 @@ class Visit:
 
     def add(self, broadcast: Broadcast) -> None:
         """Take in what a broadcast is about."""
-        self.until_ns = max(self.until_ns, broadcast.stamp_ns)
+        self.until_ns = max(self.from_ns, broadcast.stamp_ns)
         for node in broadcast.coalition.nodes:
             name = name_of(node)
             if name is None:

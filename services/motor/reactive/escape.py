@@ -30,15 +30,16 @@ class Escape:
         now_ns = wanted.stamp_ns
         if wanted.halted_by is not SpeedLimit.OBSTACLE:
             self._halted_since_ns = None
-        elif self._halted_since_ns is None:
+        elif self._halted_since_ns is None or self._halted_since_ns > now_ns:
             self._halted_since_ns = now_ns
 
         since_ns = self._halted_since_ns
         has_waited = since_ns is not None and now_ns - since_ns >= HALTED_S * 1e9
+        back_ns = round(BACK_S * 1e9)
         if is_stuck or has_waited:
-            self._until_ns = now_ns + round(BACK_S * 1e9)
+            self._until_ns = now_ns + back_ns
             self._halted_since_ns = None
-        if now_ns >= self._until_ns:
+        if not 0 < self._until_ns - now_ns <= back_ns:
             return wanted
 
         return msgspec.structs.replace(

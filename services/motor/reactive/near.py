@@ -63,7 +63,7 @@ class NearObstacles:
         self._is_still = bool(np.hypot(pose[0], pose[1]) <= STILL_M and abs(pose[2]) <= STILL_RAD)
         if len(self._points_m):
             moved_m = transform_to(pose, self._points_m)
-            age_ns = motion.stamp_ns - self._stamps_ns
+            age_ns = np.abs(motion.stamp_ns - self._stamps_ns)
             is_near = np.hypot(*moved_m.T) <= FARTHEST_M
             is_beside = moved_m[:, 0] >= -REMEMBERED_M
             self._keep(moved_m, is_near & is_beside & (age_ns <= REMEMBERED_S * 1e9))

@@ -49,7 +49,7 @@ class StuckDetector:
 
         if is_moving or self._commanded_m_s < MIN_COMMANDED_M_S:
             self._standing_since_ns = None
-        elif self._standing_since_ns is None:
+        elif self._standing_since_ns is None or self._standing_since_ns > motion.since_ns:
             self._standing_since_ns = motion.since_ns
 
         since_ns = self._standing_since_ns

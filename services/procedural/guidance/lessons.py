@@ -16,6 +16,8 @@ STEP_M = 1.5
 AHEAD_M = 40.0
 TURNED_RAD = 0.3
 STOP_NS = 5_000_000_000
+# Views become conscious so late at most; what is older than that shows that time has gone back.
+LATE_NS = 5_000_000_000
 MAX_LANDMARKS = 6
 MARKED_M = 2.0
 MAX_MARKS = 40
@@ -89,7 +91,7 @@ class Lessons:
         """Return the lessons that end with what is conscious; none if the view became conscious
         after a later one. `drives`: whether the agent does something of its own to get anywhere.
         """
-        if agent.stamp_ns <= self._seen_ns:
+        if 0 <= self._seen_ns - agent.stamp_ns <= LATE_NS:
             return []
 
         self._seen_ns = agent.stamp_ns

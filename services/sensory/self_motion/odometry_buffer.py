@@ -14,6 +14,8 @@ MAX_SPEED_M_S = 100.0
 MAX_TURN_RATE_RAD_S = 100.0
 # A stamp that is further ahead of the odometry is a mistake.
 MAX_AHEAD_NS = 60 * NS_PER_S
+# Odometry that is further behind shows that time has gone back: repeated is what led to one view.
+MAX_BEHIND_NS = 2 * NS_PER_S
 
 
 class OdometryBuffer:
@@ -24,8 +26,8 @@ class OdometryBuffer:
         self.newest_ns: int | None = None
 
     def add(self, row: Odometry) -> None:
-        """Add `row`; one that is no newer than the last is ignored. Raises MessageError if it is
-        too fast or too far ahead.
+        """Add `row`; one that is no newer than the last is ignored, and one that is far older
+        replaces all that is later. Raises MessageError if it is too fast or too far ahead.
         """
         speed_m_s = row.speed_m_s
         turn_rate_rad_s = row.turn_rate_rad_s
@@ -35,6 +37,9 @@ class OdometryBuffer:
             )
 
         self.check_near(row.stamp_ns, "odometry")
+        if self.newest_ns is not None and row.stamp_ns < self.newest_ns - MAX_BEHIND_NS:
+            self._rows = [each for each in self._rows if each.stamp_ns < row.stamp_ns]
+            self.newest_ns = None
         if self.newest_ns is None or row.stamp_ns > self.newest_ns:
             self._rows.append(row)
             self.newest_ns = row.stamp_ns

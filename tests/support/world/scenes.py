@@ -94,12 +94,13 @@ class Desk:
             self.presence(worker)
 
     def feed(self, message: Message) -> list[Message]:
-        """Let the workspace receive `message`, as it would come off a bus; an answer without a
-        source is that of whoever holds the task.
+        """Let the workspace receive `message`, as it would come off a bus: an answer that has no
+        source is of the worker that holds its task.
         """
-        if isinstance(message, Proposal) and message.task_id in self._leases:
-            holder = self._leases[message.task_id].worker
-            message = msgspec.structs.replace(message, source=message.source or holder)
+        if isinstance(message, Proposal) and not message.source:
+            lease = self._leases.get(message.task_id)
+            worker = "" if lease is None else lease.worker
+            message = msgspec.structs.replace(message, source=worker)
         published = self.module.feed(received(message))
         self.published += published
         self._unread += published

@@ -14,10 +14,12 @@ from cogmap.cli.doctor import installation
 from cogmap.cli.doctor.observed import Observed
 from cogmap.cli.doctor.system import examine
 from cogmap.schemas import topics
-from cogmap.schemas.process import Health
+from cogmap.schemas.process import Health, Paused
+from cogmap.schemas.sensing import MotorCommand
 from cogmap.schemas.topics import Topic
 
 SENSORY = Member("sensory", "sensory")
+WITH_MOTOR = ("sensory", "motor")
 
 
 def health(at_s: float, **changes: object) -> Health:
@@ -74,6 +76,21 @@ def test_a_system_that_is_well_has_no_findings() -> None:
     well = observed(health(10), health(11), health(12))
 
     assert findings(well) == []
+
+
+def test_a_robot_that_is_commanded_nothing_is_named_unless_somebody_wants_time_to_stand() -> None:
+    well = observed(health(10), health(11), health(12))
+    well.ready.add(Member("motor", "motor"))
+    well.health["motor"] = [health(10, emitted={}), health(12, emitted={})]
+
+    (finding,) = findings(well, expected=WITH_MOTOR)
+    assert finding.startswith("motor: it commanded nothing while I looked")
+    well.add(Paused(is_paused=True))
+    assert findings(well, expected=WITH_MOTOR) == []
+
+    well.add(Paused(is_paused=False))
+    well.add(MotorCommand(left_wheel_rad_s=0.0, right_wheel_rad_s=0.0))
+    assert findings(well, expected=WITH_MOTOR) == []
 
 
 def test_a_module_that_is_not_there_is_named() -> None:
