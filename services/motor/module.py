@@ -112,9 +112,8 @@ class MotorModule:
         """Measure how far it is free ahead.
 
         In lockstep a repeated scan is answered at once: by the command for the pose that waits, by
-        In lockstep a repeated scan is answered at once: by the command for the pose that waits, by
-        that which answered its view already, by a halt if no pose has come since a restart, or by
-        the last offer, which the next cycle waits for and may have lost.
+        a halt if no pose has come since a restart, or by the last offer, which the next cycle waits
+        for, and the command for its view: both may have been lost.
         """
         self._clear_m = obstacle_ahead_m(scan)
         is_repeated = scan.stamp_ns == self._gate.scan_ns
@@ -126,16 +125,18 @@ class MotorModule:
 
         answered = self._answered
         is_unheard = is_repeated and self._is_lockstep
-        if answered is not None and is_unheard and answered.stamp_ns == scan.stamp_ns:
-            return [answered]
-        if answered is None and is_unheard and self._waiting is None:
+        if is_unheard and answered is None and self._waiting is None:
             command = self._remember(halted(scan.stamp_ns, SpeedLimit.NO_POSE))
             return [*self._offers(command), command]
 
         replies = self._replies(at_once=is_repeated)
-        is_lost = is_repeated and self._is_lockstep and not replies
-        if is_lost and self._offered is not None:
-            return [self._offered]
+        if not is_unheard or replies:
+            return replies
+
+        if self._offered is not None:
+            replies.append(self._offered)
+        if answered is not None and answered.stamp_ns == scan.stamp_ns:
+            replies.append(answered)
         return replies
 
     def on_delta(self, delta: Delta) -> list[Message]:

@@ -221,6 +221,6 @@ def check_holder(proposal: Proposal, holders: set[str]) -> None:
     """Raise MessageError if the task was never given to who answers it."""
     if proposal.source not in holders:
         raise MessageError(
-            f"{proposal.task_id} was answered by {proposal.source}, "
-            f"but given to {', '.join(sorted(holders)) or 'nobody yet'}"
+            f"an answer of {proposal.source!r} to {proposal.task_id}, which was given to "
+            f"{', '.join(sorted(holders)) or 'nobody yet'}"
         )

@@ -52,7 +52,7 @@ class Session:
         workspace = registry.build("workspace", SECTIONS)
         self.shell = Shell(workspace, MemoryBus(network), health=False)
         self.shell.open()
-        self.bus.announce(Member("codelets", "everyone"))
+        self.bus.announce(Member("codelets", "w"))
         self._numbers: Counter[str] = Counter()
 
     def publish(self, message: Message) -> None:

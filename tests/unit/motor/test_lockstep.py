@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import msgspec
+
 from cogmap.runtime.module import Module
 from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas.codelets import Offer
@@ -241,13 +243,15 @@ def test_in_lockstep_one_that_halted_before_it_has_the_graph_offers_nothing_for_
     assert (offer.cycle, offer.operations) == (5, [])
 
 
-def test_in_lockstep_a_repeated_scan_that_needs_no_answer_repeats_the_offer() -> None:
+def test_in_lockstep_a_repeated_scan_repeats_the_offer_and_the_command_of_its_view() -> None:
     module, command = _answered_lockstep()
 
-    (offer,) = module.feed(scan_of())
+    offer, again = module.feed(scan_of())
 
     assert isinstance(offer, Offer)
     assert (offer.stamp_ns, offer.operations) == (command.stamp_ns, [])
+    assert isinstance(again, MotorCommand)
+    assert msgspec.structs.replace(again, seq=command.seq) == command
 
 
 def test_in_lockstep_a_restarted_module_waits_for_no_past_competition() -> None:
