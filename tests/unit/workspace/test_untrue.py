@@ -85,7 +85,8 @@ def test_an_answer_from_whom_the_task_was_not_given_to_is_refused() -> None:
     (other,) = {"w1", "w2"} - {holder}
 
     for stranger in (other, "stranger"):
-        with pytest.raises(MessageError, match=f"answered by {stranger}, but given to {holder}"):
+        refusal = f"of '{stranger}' to 1/localization, which was given to {holder}"
+        with pytest.raises(MessageError, match=refusal):
             desk.feed(msgspec.structs.replace(answer(asked), source=stranger))
 
     desk.feed(answer(asked))
