@@ -184,13 +184,15 @@ def build(
         chosen = [codelet for codelet in found if not only or codelet.name in only]
         return configured(settings, chosen)
 
+    facts = config.typed(settings, run.SECTION, run.Run)
     available: dict[str, Callable[[], Any]] = {
         "config": lambda: config.typed(settings, name, config_type(name)),
         "instance": lambda: instance or name,
-        "run": lambda: config.typed(settings, run.SECTION, run.Run),
+        "run": lambda: facts,
         "codelets": configured_codelets,
     }
     make = resolve_name(ENTRIES[name].build)
     arguments = {parameter: available[parameter]() for parameter in signature(make).parameters}
     module: Module = make(**arguments)
+    module.is_lockstep = facts.lockstep
     return module

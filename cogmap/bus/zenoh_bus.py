@@ -17,6 +17,7 @@ from cogmap.bus.codec import Envelope, decode_envelope, encode
 from cogmap.bus.depth import cached_messages
 from cogmap.bus.discovery import Role, announce_use, identify, tokens
 from cogmap.bus.incarnations import (
+    HOLD_S,
     UNNAMED,
     Gate,
     every_incarnation,
@@ -50,6 +51,7 @@ _LARGE_BYTES = 8 * 2**20
 # takes twice as long while the thread that has published it computes on.
 BATCHED_BYTES = 2**17
 TRANSIT_S = 0.002
+POLL_S = 0.05
 
 
 class _Closable(Protocol):
@@ -244,17 +246,43 @@ class ZenohBus:
             payload=payload,
             encoding=encoding(request),
             priority=ANSWER_PRIORITY,
+            consolidation=zenoh.ConsolidationMode.NONE,
             timeout=timeout_s,
         )
-        for reply in replies:
-            if reply.ok is not None:
-                return Answer(bytes(reply.ok.payload), _envelope(reply.ok))
-            reason = "" if reply.err is None else bytes(reply.err.payload).decode(errors="replace")
-            raise NoAnswerError(f"{request.name}: {reason}")
-        raise NoAnswerError(
+        reason = (
             f"nobody answers {request.name} within {timeout_s:g} s: "
             f"is the module that does running?"
         )
+        unknown = []
+        for reply in replies:
+            if reply.ok is not None:
+                answer = Answer(bytes(reply.ok.payload), _envelope(reply.ok))
+                if self._first_known([answer]):
+                    return answer
+                unknown.append(answer)
+            elif reply.err is not None:
+                said = bytes(reply.err.payload).decode(errors="replace")
+                reason = f"{request.name}: {said}"
+        if not unknown:
+            raise NoAnswerError(reason)
+
+        # While the tokens that this session watches are on their way, none may be listed.
+        until_s = time.monotonic() + HOLD_S
+        while time.monotonic() < until_s:
+            known = self._first_known(unknown)
+            if known is not None:
+                return known
+            time.sleep(POLL_S)
+        raise NoAnswerError(f"{request.name} was answered by somebody who is not on the bus")
+
+    def _first_known(self, answers: list[Answer]) -> Answer | None:
+        """Return the first answer of an incarnation that is on the bus, None if none is."""
+        present = {(each.source, each.number) for each in self.incarnations()}
+        for answer in answers:
+            envelope = answer.envelope
+            if envelope is not None and (envelope.source, envelope.incarnation) in present:
+                return answer
+        return None
 
     def serve_past(self, topic: Topic, source: str, past: Past) -> None:
         def respond(query: zenoh.Query) -> None:

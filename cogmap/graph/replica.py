@@ -61,7 +61,7 @@ class Replica:
         self._incarnation: int | None = None
         self._ended: set[int] = set()
         self._wanted_version = 0
-        self._applied: dict[int, int] = {}
+        self._applied: dict[int, Delta] = {}
 
     def join(self) -> bool:
         """Load the graph as it is now. Returns whether a workspace answers: if none does, the graph
@@ -148,17 +148,17 @@ class Replica:
 
     def _is_fork(self, delta: Delta) -> bool:
         """Decide whether the workspace published another delta in the place of one that was
-        applied: by its number, or because it has another lineage.
+        applied: an unlike one of that version, or one of another lineage.
         """
         graph = self.graph
         if delta.version <= graph.version:
-            return self._applied.get(delta.version, delta.seq) != delta.seq
+            return self._applied.get(delta.version, delta) != delta
 
         is_stated = graph.lineage is not None and delta.lineage is not msgspec.UNSET
         return is_stated and delta.lineage != graph.lineage
 
     def _note(self, delta: Delta) -> None:
-        self._applied[delta.version] = delta.seq
+        self._applied[delta.version] = delta
         if len(self._applied) > REMEMBERED_DELTAS:
             del self._applied[next(iter(self._applied))]
 

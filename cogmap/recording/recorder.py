@@ -22,6 +22,7 @@ from cogmap.recording.storage.sequences import SequenceTracker
 from cogmap.recording.storage.write_queue import LIMIT_BYTES, WriteQueue
 from cogmap.recording.storage.writer import FlushTimer, LogWriter, check_new
 from cogmap.runtime.delivery.intake import Intake, number_of
+from cogmap.runtime.delivery.plausibility import Plausibility
 from cogmap.runtime.delivery.recovery import TIMEOUT_S, Recovery
 from cogmap.schemas.topics import BY_NAME, Delivery, Topic
 
@@ -127,7 +128,7 @@ class Recorder:
         self._queue = WriteQueue(limit_bytes)
         now_ns = time.time_ns()
         continues_ns = began_ns(after, now_ns)
-        self._intake = Intake(since_ns=continues_ns)
+        self._intake = Intake(Plausibility(), since_ns=continues_ns)
         self._recovery = Recovery(bus, self._intake)
         self._after = after
         self._fetched: Counter[str] = Counter()

@@ -36,7 +36,8 @@ class Module:
     `instance` which one of them. A handler returns what to publish: None, a message, or several; of
     an iterator each message is published before the next is asked for. A message without sense
     makes it raise MessageError, before it has changed anything. `notes` returns what its health
-    reports in words: what is wrong with what it receives.
+    reports in words: what is wrong with what it receives. Where it `is_lockstep`, others wait for
+    its answer to each message.
     """
 
     name: str
@@ -56,6 +57,7 @@ class Module:
     on_load: Callable[[], Reply] | None = None
     notes: Callable[[], list[str]] | None = None
     heartbeats: frozenset[str] = frozenset()
+    is_lockstep: bool = False
     _next_seq: Counter[Topic] = field(default_factory=Counter)
 
     def __post_init__(self) -> None:

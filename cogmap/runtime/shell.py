@@ -64,9 +64,8 @@ class Shell:
     ) -> None:
         self.module = module
         self.bus = bus
-        self.inbox = Inbox()
-        self.plausibility = Plausibility()
-        self.intake = Intake(self.plausibility)
+        self.inbox = Inbox(keeps_all=module.is_lockstep)
+        self.intake = Intake(Plausibility())
         self.meter = Meter(module)
         self.publisher = Publisher(module, bus, journal, counts, store, outbox=outbox)
         self._recovery = Recovery(bus, self.intake)
@@ -192,7 +191,7 @@ class Shell:
         notes = [] if self._follower is None else self._follower.notes()
         if self.meter.faults:
             notes.append(f"{self.meter.faults} faults: run with --verbose to see them")
-        notes.extend(self.plausibility.notes())
+        notes.extend(self.intake.notes())
         if self.module.notes is not None:
             notes.extend(self.module.notes())
         if self._heartbeats is not None:

@@ -36,10 +36,14 @@ class SelfMotions:
 
     def __init__(self) -> None:
         self._motions: list[SelfMotion] = []
+        self._was_earlier = False
 
     def put(self, motion: SelfMotion, moved_ns: int) -> None:
-        """Keep self-motion, once, if it is newer than `moved_ns`, and none that is later. Raises
-        MessageError if its rows are of another shape or dtype.
+        """Keep self-motion, once, if it is newer than `moved_ns`.
+
+        Two in succession that are earlier than the newest show that this one lies ahead of time:
+        none that is later than the second is kept. Raises MessageError if its rows are of another
+        shape or dtype.
         """
         shape = motion.motions.shape
         dtype = motion.motions.dtype
@@ -47,7 +51,11 @@ class SelfMotions:
         if dtype != "<f8" or not has_columns:
             raise MessageError(f"self-motion of shape {shape} and dtype {dtype}")
 
-        self._motions = [known for known in self._motions if known.stamp_ns <= motion.stamp_ns]
+        is_earlier = motion.stamp_ns < self.newest_ns()
+        if is_earlier and self._was_earlier:
+            self._motions = [known for known in self._motions if known.stamp_ns <= motion.stamp_ns]
+        self._was_earlier = is_earlier
+
         stamps_ns = [known.stamp_ns for known in self._motions]
         is_new = motion.stamp_ns > moved_ns and motion.stamp_ns not in stamps_ns
         if is_new:
@@ -56,7 +64,7 @@ class SelfMotions:
 
     def newest_ns(self) -> int:
         """Return until when the motion is known; -1 if none is kept."""
-        return self._motions[-1].stamp_ns if self._motions else -1
+        return max((motion.stamp_ns for motion in self._motions), default=-1)
 
     def rows(self, moved_ns: int, stamp_ns: int) -> Array:
         """Return the rows from `moved_ns` up to `stamp_ns`, float64 (n, 5)."""

@@ -8,9 +8,10 @@ import time
 from queue import SimpleQueue
 
 import pytest
+from msgspec.structs import replace
 
 from cogmap.bus.codec import Envelope, decode
-from cogmap.bus.interface import Answer, Bus, Job, Member
+from cogmap.bus.interface import Answer, Bus, Incarnation, Job, Member
 from cogmap.bus.zenoh_bus import BATCHED_BYTES, TRANSIT_S, ZenohBus
 from cogmap.errors import NoAnswerError, UsageError
 from cogmap.schemas import topics
@@ -180,6 +181,7 @@ def work_aside(job: Job) -> None:
 def test_a_query_is_answered(network: Network) -> None:
     asker = network.join()
     answerer = network.join()
+    answerer.claim(Incarnation("workspace", ENVELOPE.source, ENVELOPE.incarnation))
     answerer.serve(*SNAPSHOTS, lambda payload: Answer(payload * 2, ENVELOPE), work)
     meet(asker, answerer)
 
@@ -194,7 +196,8 @@ def test_a_large_answer_arrives_although_its_sender_asks_for_what_it_missed(
     asker = over_zenoh.join()
     answerer = over_zenoh.join()
     size_bytes = 60_000_000
-    answerer.serve(*SNAPSHOTS, lambda payload: Answer(bytes(size_bytes)), work_aside)
+    answerer.claim(Incarnation("workspace", ENVELOPE.source, ENVELOPE.incarnation))
+    answerer.serve(*SNAPSHOTS, lambda payload: Answer(bytes(size_bytes), ENVELOPE), work_aside)
     publish_never_drop(asker)
     missed = Peer(answerer, *NEVER_DROP, history=1)
     missed.wait_for(len(NEVER_DROP))
@@ -214,6 +217,25 @@ def publish_never_drop(bus: Bus) -> None:
     for topic in NEVER_DROP:
         bus.declare(topic)
         bus.publish(topic, b"payload", ENVELOPE)
+
+
+def test_what_somebody_answers_who_is_not_on_the_bus_does_not_count(
+    over_zenoh: OverZenoh,
+) -> None:
+    lie = Answer(b"lie", replace(ENVELOPE, source="nobody"))
+    asker, answerer, *liars = (over_zenoh.join() for _ in range(4))
+    for liar in liars:
+        liar.serve(*SNAPSHOTS, lambda _: lie, work)
+        meet(asker, liar)
+    with pytest.raises(NoAnswerError, match="was answered by somebody who is not on the bus"):
+        asker.query(topics.SNAPSHOT_REQUEST, b"", TIMEOUT_S)
+
+    answerer.claim(Incarnation("workspace", ENVELOPE.source, ENVELOPE.incarnation))
+    answerer.serve(*SNAPSHOTS, lambda payload: Answer(b"truth", ENVELOPE), work)
+    meet(asker, answerer)
+
+    for _ in range(5):
+        assert asker.query(topics.SNAPSHOT_REQUEST, b"", TIMEOUT_S).payload == b"truth"
 
 
 def test_an_error_of_the_answerer_comes_back_in_words(network: Network) -> None:

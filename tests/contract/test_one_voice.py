@@ -158,8 +158,8 @@ def test_whoever_publishes_is_on_the_bus_with_its_incarnation(
     assert wheels.take_number() == 0
 
     here = wheels.peer.bus
+    wait_until(lambda: len(here.incarnations()) == 1, "it is listed")
     (incarnation,) = here.incarnations()
-
     assert (incarnation.source, incarnation.number) == ("sim", FIRST)
     assert Member("sim", "sim") in here.members()
 
@@ -261,8 +261,9 @@ def test_a_second_of_a_single_module_is_refused_by_a_sentence(
 def test_one_that_states_no_incarnation_is_in_its_place_too(network: Network) -> None:
     foreign = network.join()
     second = network.join()
-    foreign.announce(Member("motor", "wanderer"))
-    await_members(second, Member("motor", "wanderer"))
+    wanderer = Member("motor", "wanderer")
+    foreign.announce(wanderer)
+    wait_until(lambda: second.members() == [wanderer], "it is listed")
 
     with pytest.raises(UsageError, match=r"^wanderer is on the bus already"):
         take(second, motor("motor"), SECOND)

@@ -16,10 +16,12 @@ class Inbox:
     """Arrivals in order.
 
     Of a LATEST_WINS topic only the newest of each source stays, in the place of the one that it
-    replaced; `superseded` counts those by topic.
+    replaced; `superseded` counts those by topic. One that `keeps_all` replaces none: in lockstep
+    somebody waits for an answer to each, and a message that is none may be the newest.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, keeps_all: bool = False) -> None:
+        self._keeps_all = keeps_all
         self._waiting: SimpleQueue[Arrival | Job | _Slot] = SimpleQueue()
         self._newest: dict[_Slot, Arrival] = {}
         self._replacing = threading.Lock()
@@ -28,7 +30,8 @@ class Inbox:
     def put(self, arrival: Arrival) -> None:
         """Enqueue; called from the bus's threads."""
         topic = arrival.topic
-        if topic.delivery is not Delivery.LATEST_WINS or arrival.refused:
+        is_replaceable = topic.delivery is Delivery.LATEST_WINS and not self._keeps_all
+        if not is_replaceable or arrival.refused:
             self._waiting.put(arrival)
             return
 

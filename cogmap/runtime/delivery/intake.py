@@ -9,6 +9,7 @@ from collections import Counter
 from cogmap.bus.codec import UNKNOWN, Envelope, decode
 from cogmap.bus.interface import Arrival
 from cogmap.errors import MessageError
+from cogmap.runtime.delivery.contents import Contents
 from cogmap.runtime.delivery.numbers import MAX_JUMP, Numbers
 from cogmap.runtime.delivery.plausibility import Plausibility
 from cogmap.schemas.base import Message
@@ -36,6 +37,7 @@ class _Stream:
     def __init__(self, first: Envelope) -> None:
         self._last = first
         self._numbers = {first.incarnation: Numbers(first.seq)}
+        self._contents = Contents()
 
     @property
     def number(self) -> int | None:
@@ -61,13 +63,28 @@ class _Stream:
             return range(0)
         return range(greatest + 1, number)
 
-    def advance(self, envelope: Envelope) -> int:
-        """Take account of `envelope`. Returns how many more messages are missing because of it.
+    @property
+    def contradictions(self) -> int:
+        """Return how many messages had the number of another one."""
+        return self._contents.contradictions
 
-        Raises MessageError if its number came before, or cannot be believed yet.
+    def begin(self, payload: bytes) -> None:
+        """Take note of what the first message holds."""
+        self._contents.add(self._last, payload)
+
+    def advance(self, envelope: Envelope, payload: bytes) -> int:
+        """Take account of a message. Returns how many more are missing because of it.
+
+        Raises MessageError if it came before, or its number cannot be believed yet.
         """
         numbers = self._numbers.get(envelope.incarnation)
-        missing = self._begin(envelope) if numbers is None else numbers.add(envelope.seq)
+        missing = 0
+        if numbers is None:
+            missing = self._begin(envelope)
+        elif not self._contents.contradicts(envelope, payload):
+            missing = numbers.add(envelope.seq)
+
+        self._contents.add(envelope, payload)
         self._last = envelope
         return missing
 
@@ -94,6 +111,7 @@ class Intake:
 
     A source that began after `since_ns` is missing from its number 0 on; without that, nothing is
     missing before the first message that comes. With `plausibility` it refuses what cannot be true.
+    Messages of one number that are unlike are all received.
     """
 
     def __init__(
@@ -106,6 +124,8 @@ class Intake:
         self.gaps: Counter[str] = Counter()
         self._missing: Counter[str] = Counter()
         self._given_up: Counter[str] = Counter()
+        self._contradictions = 0
+        self._last_contradiction = ""
         self._streams: dict[tuple[Topic, str], _Stream] = {}
         self._log_after_s: dict[str, float] = {}
         self._suppressed: Counter[str] = Counter()
@@ -125,7 +145,7 @@ class Intake:
             if self._plausibility is not None:
                 self._plausibility.check(topic, message, time.monotonic_ns())
             if topic.delivery is Delivery.NEVER_DROP:
-                self._follow(topic, envelope)
+                self._follow(topic, envelope, bytes(arrival.payload))
         except MessageError as error:
             self.reject(topic.name, str(error))
             return None
@@ -172,21 +192,37 @@ class Intake:
         self.rejected[topic] += 1
         self._log(topic, f"rejected {reason}")
 
-    def _follow(self, topic: Topic, envelope: Envelope) -> None:
+    def notes(self) -> list[str]:
+        """Return what cannot be true of the messages, and which contradict each other."""
+        notes = [] if self._plausibility is None else self._plausibility.notes()
+        if self._contradictions:
+            notes.append(
+                f"{self._contradictions} messages contradict others of the same number, the last: "
+                f"{self._last_contradiction}: somebody else publishes in its name"
+            )
+        return notes
+
+    def _follow(self, topic: Topic, envelope: Envelope, payload: bytes) -> None:
         """Notice what is missing before a message. Raises MessageError for one that came before,
         or whose number cannot be believed yet.
         """
         stream = self._streams.get((topic, envelope.source))
         if stream is None:
             self._streams[topic, envelope.source] = _Stream(envelope)
+            self._streams[topic, envelope.source].begin(payload)
             return
 
+        contradictions = stream.contradictions
         try:
-            missing = stream.advance(envelope)
+            missing = stream.advance(envelope, payload)
         except MessageError as error:
             raise MessageError(
                 f"{topic.name}: number {envelope.seq} of {envelope.source} {error}"
             ) from None
+        if stream.contradictions > contradictions:
+            self._contradictions += 1
+            self._last_contradiction = f"{topic.name}: number {envelope.seq} of {envelope.source}"
+            self._log(topic.name, f"{self._last_contradiction} came twice, with unlike contents")
         if missing:
             self._missing[topic.name] += missing
             self._count_gaps(topic.name)

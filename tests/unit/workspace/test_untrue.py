@@ -218,3 +218,27 @@ def test_the_self_node_of_a_later_time_is_that_of_the_true_view_in_the_end() -> 
     agent = desk.graph.get(Self, SELF_ID)
     assert agent is not None
     assert agent.stamp_ns == stamp_ns(4)
+
+
+def test_self_motion_of_an_earlier_time_takes_the_place_of_none() -> None:
+    desk = Desk("w1")
+    desk.drive(range(10))
+
+    desk.feed(self_motion(10))
+    desk.feed(self_motion(2))
+    desk.feed(percepts(10))
+
+    assert _began(desk, 10)
+
+
+def test_self_motion_of_a_later_time_is_forgotten_once_two_true_ones_have_come() -> None:
+    desk = Desk("w1")
+    desk.drive(range(3))
+    desk.feed(self_motion(LATER))
+
+    desk.drive(range(3, 5))
+    desk.feed(percepts(5))
+
+    assert not desk.take()
+    desk.feed(self_motion(5))
+    assert desk.take()
