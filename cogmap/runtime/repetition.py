@@ -11,8 +11,14 @@ CHECK_NS = 100_000_000
 """How often the wait for an answer is looked at."""
 
 REPEAT_AFTER_NS = 10_000_000_000
-"""Wall time without an answer after which it is repeated, though nobody was away: no cycle of a
-loaded machine takes as long.
+"""Wall time without an answer after which it is repeated, though nobody was away and the usual wait
+is not known: no cycle of a loaded machine takes as long.
+"""
+
+UNDOUBTED_AFTER_NS = 3_000_000_000
+UNDOUBTED_TIMES_USUAL = 20
+"""The same once the usual wait is known: so long, and so many times the usual wait. An answer may
+be missing because somebody answered a task with nothing in a worker's name.
 """
 
 DOUBTED_AFTER_NS = 500_000_000
@@ -89,7 +95,10 @@ class Repetition:
 
     @property
     def _patience_ns(self) -> float:
-        if not self._doubted:
-            return REPEAT_AFTER_NS
         usual_ns = median(self._waits_ns)
+        if not self._doubted:
+            is_known = min(self._waits_ns) > 0
+            patience_ns = max(UNDOUBTED_AFTER_NS, UNDOUBTED_TIMES_USUAL * usual_ns)
+            return min(REPEAT_AFTER_NS, patience_ns) if is_known else REPEAT_AFTER_NS
+
         return min(REPEAT_AFTER_NS, max(DOUBTED_AFTER_NS, TIMES_USUAL * usual_ns))

@@ -10,7 +10,7 @@ from cogmap.bus.codec import UNKNOWN, Envelope, decode
 from cogmap.bus.interface import Arrival
 from cogmap.errors import MessageError
 from cogmap.runtime.delivery.contents import Contents
-from cogmap.runtime.delivery.numbers import MAX_JUMP, Numbers
+from cogmap.runtime.delivery.numbers import MAX_JUMP, Newest, Numbers
 from cogmap.runtime.delivery.plausibility import Plausibility
 from cogmap.schemas.base import Message
 from cogmap.schemas.topics import Delivery, Topic
@@ -18,6 +18,7 @@ from cogmap.schemas.topics import Delivery, Topic
 log = logging.getLogger("cogmap")
 LOG_INTERVAL_S = 1.0
 _MAX_SENTENCE = 500
+MAX_SOURCES = 1024
 MAX_INCARNATIONS = 4
 """Lives of a source whose numbers are kept: one that was away may come back."""
 
@@ -127,6 +128,7 @@ class Intake:
         self._contradictions = 0
         self._last_contradiction = ""
         self._streams: dict[tuple[Topic, str], _Stream] = {}
+        self._newest: dict[tuple[Topic, str, int], Newest] = {}
         self._log_after_s: dict[str, float] = {}
         self._suppressed: Counter[str] = Counter()
 
@@ -146,6 +148,8 @@ class Intake:
                 self._plausibility.check(topic, message, time.monotonic_ns())
             if topic.delivery is Delivery.NEVER_DROP:
                 self._follow(topic, envelope, bytes(arrival.payload))
+            else:
+                self._follow_newest(topic, envelope)
         except MessageError as error:
             self.reject(topic.name, str(error))
             return None
@@ -226,6 +230,24 @@ class Intake:
         if missing:
             self._missing[topic.name] += missing
             self._count_gaps(topic.name)
+
+    def _follow_newest(self, topic: Topic, envelope: Envelope) -> None:
+        """Compare a message with the one before. Raises MessageError if its number cannot be
+        believed yet.
+        """
+        key = (topic, envelope.source, envelope.incarnation)
+        newest = self._newest.get(key)
+        if newest is None:
+            newest = self._newest[key] = Newest()
+            if len(self._newest) > MAX_SOURCES:
+                del self._newest[next(iter(self._newest))]
+
+        try:
+            newest.add(envelope.seq)
+        except MessageError as error:
+            raise MessageError(
+                f"{topic.name}: number {envelope.seq} of {envelope.source} {error}"
+            ) from None
 
     def _count_gaps(self, topic: str) -> None:
         """Count the lost once: numbers that are missing are also what the bus gave up."""

@@ -15,6 +15,47 @@ MIN_RUN = 3
 MAX_RANGES = 64
 
 
+class Jump:
+    """The last numbers in a row that are too far ahead to be believed one by one."""
+
+    def __init__(self) -> None:
+        self._last = -1
+        self._length = 0
+
+    def check(self, number: int, last: int) -> None:
+        """Compare a number with the `last` that was believed. Raises MessageError if it is too far
+        ahead to be believed yet.
+        """
+        ahead = number - last
+        if ahead <= MAX_JUMP:
+            self._length = 0
+            return
+
+        follows = self._length > 0 and number == self._last + 1
+        self._length = self._length + 1 if follows else 1
+        self._last = number
+        if self._length < MIN_RUN:
+            raise MessageError(f"is {ahead} ahead of the last, at most {MAX_JUMP} are believed")
+
+    def end(self) -> None:
+        """Note that one came that is not ahead."""
+        self._length = 0
+
+
+class Newest:
+    """The newest number of a source of whose messages any may be missing."""
+
+    def __init__(self) -> None:
+        self._last: int | None = None
+        self._jump = Jump()
+
+    def add(self, number: int) -> None:
+        """Take account of a number. Raises MessageError if it cannot be believed yet."""
+        if self._last is not None:
+            self._jump.check(number, self._last)
+        self._last = number
+
+
 class Numbers:
     """The ranges (first, last) of the numbers received, in order.
 
@@ -25,8 +66,7 @@ class Numbers:
     def __init__(self, first: int) -> None:
         self._firsts = [first]
         self._lasts = [first]
-        self._run_last = -1
-        self._run_length = 0
+        self._jump = Jump()
 
     @property
     def last(self) -> int:
@@ -41,25 +81,14 @@ class Numbers:
         ahead = number - self.last
         if ahead == 1:
             self._lasts[-1] = number
-            self._run_length = 0
+            self._jump.end()
             return 0
 
         place = bisect_right(self._firsts, number)
         if place > 0 and number <= self._lasts[place - 1]:
             raise MessageError("came twice")
-        if ahead > MAX_JUMP and not self._is_run(number):
-            raise MessageError(f"is {ahead} ahead of the last, at most {MAX_JUMP} are believed")
-
-        if ahead <= MAX_JUMP:
-            self._run_length = 0
+        self._jump.check(number, self.last)
         return self._insert(place, number)
-
-    def _is_run(self, number: int) -> bool:
-        """Decide whether numbers so far ahead have come in a row."""
-        follows = self._run_length > 0 and number == self._run_last + 1
-        self._run_length = self._run_length + 1 if follows else 1
-        self._run_last = number
-        return self._run_length >= MIN_RUN
 
     def _insert(self, place: int, number: int) -> int:
         """Insert a number before the range `place`, and join the ranges that it touches."""

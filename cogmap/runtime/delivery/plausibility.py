@@ -16,6 +16,11 @@ least once a second, no flood is.
 """
 
 
+BACK_NS = 30_000_000_000
+"""How far a message is behind the one before, so that it is counted: no answer takes as long."""
+MAX_SOURCES = 1024
+
+
 @dataclass(frozen=True)
 class Kind:
     """Numbers that rise together in all messages, in the first of `fields` that a message has.
@@ -84,6 +89,39 @@ class Course:
         self.agreeing = 0
 
 
+class Returns:
+    """Counts the messages that lie far behind the one before, of their source on their topic.
+
+    They are believed: a simulation may begin anew.
+    """
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._last = ""
+        self._stamps_ns: dict[tuple[Topic, str], int] = {}
+
+    def follow(self, topic: Topic, message: Message) -> None:
+        """Take account of a message."""
+        stamp_ns = message.stamp_ns
+        if not stamp_ns:
+            return
+
+        key = (topic, message.source)
+        behind_ns = self._stamps_ns.pop(key, stamp_ns) - stamp_ns
+        self._stamps_ns[key] = stamp_ns
+        if len(self._stamps_ns) > MAX_SOURCES:
+            del self._stamps_ns[next(iter(self._stamps_ns))]
+        if behind_ns > BACK_NS:
+            self._count += 1
+            self._last = f"{topic.name} of {message.source}, by {behind_ns / 1e9:.0f} s"
+
+    def notes(self) -> list[str]:
+        """Return how many went back, and which was the last."""
+        if not self._count:
+            return []
+        return [f"{self._count} messages went back in time, the last: {self._last}"]
+
+
 class Plausibility:
     """Compares each message with those that one process accepted before, of all topics together.
 
@@ -95,16 +133,16 @@ class Plausibility:
         self.refused = 0
         self._last_reason = ""
         self._courses = {kind: Course() for kind in KINDS}
+        self._wall_courses = {kind: Course() for kind in KINDS}
+        self._returns = Returns()
 
     def check(self, topic: Topic, message: Message, now_ns: int) -> None:
         """Accept `message`, at `now_ns` by a monotonic clock. Raises MessageError if a number of it
         lies too far from those before.
         """
-        if topic is HEALTH:
-            return  # it is of the wall's time
-
         stated = []
-        for kind, course in self._courses.items():
+        courses = self._wall_courses if topic is HEALTH else self._courses
+        for kind, course in courses.items():
             number = kind.of(message)
             if not number:
                 continue
@@ -114,15 +152,19 @@ class Plausibility:
 
         for course, number in stated:
             course.advance(number)
+        self._returns.follow(topic, message)
 
     def notes(self) -> list[str]:
-        """Return how many messages were refused, and why the last one."""
-        if not self.refused:
-            return []
-        return [
-            f"{self.refused} messages were refused that cannot be true, the last: "
-            f"{self._last_reason}"
-        ]
+        """Return how many messages were refused, and why the last one; and how many went back in
+        time.
+        """
+        notes = self._returns.notes()
+        if self.refused:
+            notes.append(
+                f"{self.refused} messages were refused that cannot be true, the last: "
+                f"{self._last_reason}"
+            )
+        return notes
 
     def _refuse(self, topic: Topic, message: Message, reason: str) -> None:
         self.refused += 1

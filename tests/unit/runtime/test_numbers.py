@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from cogmap.errors import MessageError
-from cogmap.runtime.delivery.numbers import MAX_JUMP, MAX_RANGES, Numbers
+from cogmap.runtime.delivery.numbers import MAX_JUMP, MAX_RANGES, Newest, Numbers
 
 FAR = 2**61
 
@@ -94,3 +94,14 @@ def test_the_numbers_of_many_gaps_take_no_more_room() -> None:
 def test_what_came_before_the_first_that_was_received_is_new() -> None:
     assert missing_after(10, 5) == 4
     assert missing_after(10, 9) == 0
+
+
+def test_where_any_may_be_missing_a_number_is_refused_only_if_it_is_far_ahead() -> None:
+    newest = Newest()
+    for number in (5, 6, 6, 3, MAX_JUMP):
+        newest.add(number)
+
+    for number in (FAR, FAR + 5):
+        with pytest.raises(MessageError, match="ahead of the last"):
+            newest.add(number)
+    newest.add(7)

@@ -115,6 +115,18 @@ def test_health_is_of_the_walls_time() -> None:
     assert process.accepts(clock(6))
 
 
+def test_what_lies_far_behind_the_message_before_is_accepted_and_named() -> None:
+    process = Process()
+    for stamp_s in (100, 90, 101):
+        assert process.accepts(clock(stamp_s))
+    assert process.plausibility.notes() == []
+
+    assert process.accepts(clock(41))
+
+    (note,) = process.plausibility.notes()
+    assert note == "1 messages went back in time, the last: clock of sim, by 60 s"
+
+
 def test_of_a_refused_message_no_number_counts() -> None:
     process = Process()
     process.accepts(competition(7, 5 * S))

@@ -10,6 +10,7 @@ from cogmap.runtime.repetition import (
     DOUBTED_VIEWS,
     KEPT_WAITS,
     REPEAT_AFTER_NS,
+    UNDOUBTED_AFTER_NS,
     Repetition,
 )
 from cogmap.schemas.process import Presence
@@ -54,6 +55,17 @@ def leave_and_return(waiting: Waiting, instance: str = "motor") -> None:
 def test_where_all_stayed_a_view_is_repeated_after_longer_than_any_cycle(waiting: Waiting) -> None:
     assert waiting.times_asked_in(REPEAT_AFTER_NS) == 0
     assert waiting.times_asked_in(2 * REPEAT_AFTER_NS) == 2
+
+
+def test_once_it_is_known_how_long_answers_take_one_that_is_missing_is_asked_for_sooner(
+    waiting: Waiting,
+) -> None:
+    for _ in range(KEPT_WAITS + 1):
+        waiting.times_asked_in(CHECK_NS)
+        waiting.answer()
+
+    assert waiting.times_asked_in(UNDOUBTED_AFTER_NS) == 0
+    assert waiting.times_asked_in(UNDOUBTED_AFTER_NS) == 1
 
 
 def test_whoever_joins_has_lost_nothing(waiting: Waiting) -> None:
