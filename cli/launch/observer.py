@@ -17,6 +17,8 @@ from cogmap.schemas.sensing import TruePose, TrueTown
 
 OBSERVED = (topics.TRUE_TOWN, *FOLLOWED)
 MAX_REASONS = 8
+MAX_POSES = 16_384
+"""Of each path: 54 minutes at five views a second, and of a longer drive every second one."""
 STREET_M = 8.0
 """Farther from all of its path so far, the robot is in a street new to it."""
 
@@ -44,7 +46,7 @@ class Observer(Paths):
     """Follows a drive from outside: its paths, its goals, and how much of it is over."""
 
     def __init__(self) -> None:
-        super().__init__()
+        super().__init__(MAX_POSES)
         self.town: TrueTown | None = None
         self.played = Played()
         self.place_m = (0.0, 0.0)

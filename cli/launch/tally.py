@@ -4,9 +4,9 @@ Pure.
 
 from __future__ import annotations
 
+from array import array
 from collections import Counter, deque
 from collections.abc import Mapping
-from statistics import fmean
 
 import msgspec
 
@@ -107,8 +107,8 @@ class Tally:
         self.observer = Observer()
         self.percepts = PerceptTally()
         self.replica = replica
-        self.cycle_ms: list[float] = []
-        self.bus_ms: list[float] = []
+        self.cycle_ms = array("d")
+        self.bus_ms = array("d")
         self.broadcasts = 0
         self.dropped = 0
         self.refused: deque[str] = deque(maxlen=MAX_REASONS)
@@ -119,7 +119,8 @@ class Tally:
         self.energy = EnergyTally()
         self.is_paused = False
         self.health: dict[str, Health] = {}
-        self._busy: dict[str, list[float]] = {}
+        self._busy: dict[str, float] = {}
+        self._reports: Counter[str] = Counter()
 
     def receive(self, arrival: Arrival, intake: Intake) -> None:
         """Take account of an arrival; `intake` counts it if it is lost, or not valid."""
@@ -147,7 +148,8 @@ class Tally:
                 self.replica.follow(message)
             case Health():
                 self.health[message.instance] = message
-                self._busy.setdefault(message.instance, []).append(message.busy)
+                self._busy[message.instance] = self._busy.get(message.instance, 0.0) + message.busy
+                self._reports[message.instance] += 1
             case Broadcast():
                 self.broadcasts += 1
             case Energy():
@@ -180,7 +182,7 @@ class Tally:
     @property
     def busy(self) -> dict[str, float]:
         """Return the mean share of its time that each instance was computing."""
-        return {name: fmean(shares) for name, shares in sorted(self._busy.items())}
+        return {name: total / self._reports[name] for name, total in sorted(self._busy.items())}
 
     def gaps(self, own: Counter[str]) -> dict[str, int]:
         """Count messages lost for good on each NEVER_DROP topic, by whoever lost most: a module, or

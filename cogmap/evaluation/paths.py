@@ -73,19 +73,19 @@ class Paths:
     """Follows the robot's true path, the estimated one, and path integration alone. The agent's
     frame has its origin in the robot's first pose, until a map is recalled.
 
-    `start` is the first true pose; None before there is one.
+    `start` is the first true pose; None before there is one. `most` bounds the poses of each path.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, most: int | None = None) -> None:
         self.start: Pose | None = None
         self._start_ns = 0
         self._is_recording = False
         self._frame = MapFrame()
         self._true_m = 0.0
-        self._true = Track()
-        self._estimate = Track()
-        self._wheels = PathIntegrator()
-        self._fused = PathIntegrator()
+        self._true = Track(most)
+        self._estimate = Track(most)
+        self._wheels = PathIntegrator(most)
+        self._fused = PathIntegrator(most)
 
     def update(self, message: Message) -> None:
         """Take account of one message; one that does not concern the robot's path is ignored.

@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import math
+from array import array
 
 import numpy as np
 
 from cogmap.geometry.arrays import Booleans, Floats, Indices
 from cogmap.geometry.polylines import interpolate
 
+POSE_COLUMNS = 3
+
 
 class Track:
-    """Poses in the order of their stamps."""
+    """Poses in the order of their stamps: `most` of them, if it is given. Where more come, every
+    second one of those before is left out.
+    """
 
-    def __init__(self) -> None:
-        self._stamps_ns: list[int] = []
-        self._poses: list[tuple[float, float, float]] = []
+    def __init__(self, most: int | None = None) -> None:
+        self._most = most
+        self._stamps_ns = array("q")
+        self._poses = array("d")
 
     def add(self, stamp_ns: int, x_m: float, y_m: float, heading_rad: float) -> None:
         """Append a pose. It replaces one of the same stamp; one that is out of order is ignored."""
@@ -23,10 +29,12 @@ class Track:
         last_ns = self.last_ns
 
         if last_ns is None or stamp_ns > last_ns:
+            if len(self) == self._most:
+                self._thin()
             self._stamps_ns.append(stamp_ns)
-            self._poses.append(pose)
+            self._poses.extend(pose)
         elif stamp_ns == last_ns:
-            self._poses[-1] = pose
+            self._poses[-POSE_COLUMNS:] = array("d", pose)
 
     @property
     def last_ns(self) -> int | None:
@@ -45,7 +53,7 @@ class Track:
     def poses(self) -> Floats:
         """Return the (n, 3) poses."""
         poses = np.array(self._poses, np.float64)
-        return poses.reshape(-1, 3)
+        return poses.reshape(-1, POSE_COLUMNS)
 
     @property
     def points_m(self) -> Floats:
@@ -94,14 +102,20 @@ class Track:
         new_m: Floats = steps_m[from_known_m > away_m]
         return new_m
 
+    def _thin(self) -> None:
+        stamps_ns = self.stamps_ns[::2]
+        poses = self.poses[::2]
+        self._stamps_ns = array("q", stamps_ns.tobytes())
+        self._poses = array("d", poses.tobytes())
+
 
 class PathIntegrator:
     """Path integration alone: measured speeds add up to a path from the origin, heading along x,
-    and to the distance `travelled_m`, there and back.
+    and to the distance `travelled_m`, there and back. `most` bounds its track.
     """
 
-    def __init__(self) -> None:
-        self.track = Track()
+    def __init__(self, most: int | None = None) -> None:
+        self.track = Track(most)
         self.travelled_m = 0.0
         self._x_m = 0.0
         self._y_m = 0.0

@@ -31,11 +31,15 @@ class Sight:
     object: str = ""
 
 
+MAX_SIGHTS = 32_768
+"""Percepts that are kept: of some half an hour. Of a longer drive the last ones count."""
+
+
 class PerceptTally:
     """Follows percepts, deltas and true poses. `seen` has all that was perceived, but for places to
     charge at; `entered` has the percepts that came into the agent's graph, with what they were
-    given to. `poses` are the true x_m, y_m and heading_rad by stamp. A view's percepts and their
-    delta are from two processes: either may arrive first.
+    given to: of both the last MAX_SIGHTS at least. `poses` are the true x_m, y_m and heading_rad by
+    stamp. A view's percepts and their delta are from two processes: either may arrive first.
 
     A percept is given to an object by its INSTANCE link, also by one that comes later. One without
     a link is given to the object that is made of it: the one of its label that enters the map in
@@ -79,8 +83,17 @@ class PerceptTally:
                         sight = Sight(*key, tuple(percept.outline_px), message.calibration)
                         self._perceived[key] = sight
                         self.seen.append(sight)
+                if len(self.seen) > 2 * MAX_SIGHTS:
+                    self._forget(self.seen[-MAX_SIGHTS].stamp_ns)
             case Delta():
                 self._on_delta(message)
+
+    def _forget(self, until_ns: int) -> None:
+        """Forget what is older."""
+        self.seen = [each for each in self.seen if each.stamp_ns >= until_ns]
+        self._entered = [each for each in self._entered if each.stamp_ns >= until_ns]
+        self._perceived = {key: each for key, each in self._perceived.items() if key[0] >= until_ns}
+        self.poses = {at_ns: pose for at_ns, pose in self.poses.items() if at_ns >= until_ns}
 
     def _on_delta(self, delta: Delta) -> None:
         made = []

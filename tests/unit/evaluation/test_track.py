@@ -29,3 +29,13 @@ def test_between_two_poses_a_heading_turns_the_shorter_way() -> None:
     (middle,) = track.at(np.array([5]))
 
     assert middle == pytest.approx([1.0, 2.0, math.pi])
+
+
+def test_of_a_long_track_every_second_pose_stays_and_its_ends() -> None:
+    track = Track(most=8)
+    for stamp_ns in range(30):
+        track.add(stamp_ns, float(stamp_ns), 0.0, 0.0)
+
+    assert len(track) <= 8
+    assert (track.stamps_ns[0], track.last_ns) == (0, 29)
+    assert track.at(np.arange(30))[:, 0] == pytest.approx(np.arange(30))

@@ -12,7 +12,7 @@ from cogmap.bus.codec import Envelope
 from cogmap.cli.launch.drive_metrics import drive_metrics, headline
 from cogmap.cli.launch.individuals.buildings import NOTHING, Buildings
 from cogmap.cli.launch.individuals.judge import SEEN_VIEWS, BuildingMetrics
-from cogmap.cli.launch.individuals.percepts import PerceptTally
+from cogmap.cli.launch.individuals.percepts import MAX_SIGHTS, PerceptTally
 from cogmap.cli.launch.tally import Tally
 from cogmap.errors import NoAnswerError
 from cogmap.graph.graph import Graph
@@ -328,3 +328,15 @@ def test_a_percept_has_its_outline_whichever_of_two_messages_comes_first() -> No
 
         (entered,) = tally.entered
         assert list(entered.outline_px) == outline_px
+
+
+def test_of_a_long_drive_the_last_percepts_are_kept() -> None:
+    tally = PerceptTally()
+    in_a_view = 64
+    views = 3 * MAX_SIGHTS // in_a_view
+    seen = [percept("inn", bearing_rad, 12.0) for bearing_rad in np.linspace(-1.0, 1.0, in_a_view)]
+    for frame in range(views):
+        tally.update(percepts(frame, *seen))
+
+    assert MAX_SIGHTS <= len(tally.seen) <= 2 * MAX_SIGHTS
+    assert tally.seen[-1].stamp_ns == stamp_ns(views - 1)
