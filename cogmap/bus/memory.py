@@ -116,6 +116,8 @@ class MemoryBus:
         self._network.deliver(arrival)
 
     def claim(self, incarnation: Incarnation) -> None:
+        if self._module == UNNAMED:
+            self._module = incarnation.module
         before = self._claimed.get(incarnation.source)
         self._claimed[incarnation.source] = incarnation
         if before is not None:

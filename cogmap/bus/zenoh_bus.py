@@ -142,6 +142,8 @@ class ZenohBus:
             time.sleep(TRANSIT_S)
 
     def claim(self, incarnation: Incarnation) -> None:
+        if self._module == UNNAMED:
+            self._module = incarnation.module
         before = self._claimed.get(incarnation.source)
         if before is not None:
             before[1].undeclare()

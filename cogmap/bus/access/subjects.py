@@ -176,6 +176,7 @@ _MODULES = (
             topics.COMPETITION,
             topics.BROADCAST,
             topics.CLOCK,
+            topics.HEALTH,
         ),
         answers=(topics.SNAPSHOT_REQUEST,),
     ),

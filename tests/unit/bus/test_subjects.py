@@ -49,6 +49,8 @@ def declared(modules: Iterator[Module]) -> Subject:
         publishes |= module.emits
         subscribes |= module.handlers.keys() - {topics.PRESENCE}
         answers |= module.served.keys()
+        if module.heartbeats:
+            subscribes.add(topics.HEALTH)
         if module.graph is not None:
             asks.add(topics.SNAPSHOT_REQUEST)
         if module.remembers:
