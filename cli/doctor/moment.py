@@ -8,6 +8,7 @@ from cogmap.cli.doctor.finding import Finding
 from cogmap.cli.doctor.observed import Observed
 from cogmap.cli.launch.plan import OBSERVER
 from cogmap.cli.launch.watchdog import MAX_SHARE_SLOWED, REMEDY
+from cogmap.runtime.notes import LATE_ANSWERS
 from cogmap.services import registry
 
 SYSTEM = "system"
@@ -77,9 +78,13 @@ def starting(expected: Sequence[str], observed: Observed) -> Finding | None:
 
 
 def slow_machine(observed: Observed, late: Sequence[Finding]) -> list[Finding]:
-    """Name the machine as the cause of the findings `late` and of old poses. Empty if it is not."""
+    """Name the machine as the cause of the findings `late` and of old poses. Empty if it is not: a
+    slow link, too, makes answers late and so poses old.
+    """
     is_busy = bool(late) and observed.busy >= ALL_BUSY
     has_old_poses = observed.limited > MAX_SHARE_SLOWED * observed.commands
+    if _has_late_answers(observed) and not is_busy:
+        return []
     if not is_busy and not has_old_poses:
         return []
 
@@ -91,3 +96,9 @@ def slow_machine(observed: Observed, late: Sequence[Finding]) -> list[Finding]:
         reasons.append(f"the robot drives slowly, as {share:.0%} of its poses are old")
     reasons += [f"{finding.about}: {finding.wrong}" for finding in late]
     return [Finding("machine", f"it is too slow for real time: {'; '.join(reasons)}", REMEDY)]
+
+
+def _has_late_answers(observed: Observed) -> bool:
+    """Return whether a process says that answers are late."""
+    newest = [reports[-1] for reports in observed.health.values()]
+    return any(note.startswith(LATE_ANSWERS) for report in newest for note in report.notes)

@@ -9,6 +9,7 @@ from cogmap.bus.discovery import Role, System
 from cogmap.cli.doctor import moment
 from cogmap.cli.doctor.finding import Finding
 from cogmap.cli.doctor.observed import Observed
+from cogmap.runtime.notes import wrong_and_remedy
 from cogmap.schemas import topics
 from cogmap.schemas.process import Health
 from cogmap.schemas.topics import Scope
@@ -92,7 +93,8 @@ def complaints(observed: Observed) -> Iterator[Finding]:
                 )
 
         for note in last.notes:
-            yield Finding(instance, note, "see its log")
+            wrong, remedy = wrong_and_remedy(note)
+            yield Finding(instance, wrong, remedy or "see its log")
 
 
 def rejections(observed: Observed) -> Iterator[tuple[str, Finding]]:

@@ -40,13 +40,23 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
     ] = 1.0
     deadline_ms: Annotated[
         Milliseconds,
-        msgspec.Meta(description="In real time, the age of the view at which a cycle ends, ms."),
+        msgspec.Meta(
+            description="In real time, the age of the view at which a cycle ends, ms: later where "
+            "answers usually take longer."
+        ),
     ] = 180.0
+    longest_deadline_ms: Annotated[
+        Milliseconds,
+        msgspec.Meta(
+            description="In real time, the age of the view up to which a cycle waits for answers "
+            "that usually take long, as over a slow link, ms."
+        ),
+    ] = 1000.0
     lease_ms: Annotated[
         Milliseconds,
         msgspec.Meta(
             description="In real time, how long a worker may take for a task before another gets "
-            "it, ms."
+            "it, ms: longer where all usually take longer."
         ),
     ] = 120.0
     decay: Annotated[

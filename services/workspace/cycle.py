@@ -16,6 +16,7 @@ from cogmap.schemas.cognition import Broadcast, Competition
 from cogmap.schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
 from cogmap.schemas.process import Clock, Presence
 from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
+from cogmap.services.workspace.answer_delay import AnswerDelay
 from cogmap.services.workspace.association.individuals import Individuals, as_entered
 from cogmap.services.workspace.commit import Ledger, coalitions_of
 from cogmap.services.workspace.config import Config
@@ -59,8 +60,8 @@ class Workspace:
         writers = {codelet.name: codelet.codelet.may_write for codelet in codelets}
         self._ledger = Ledger(writers)
         self._lanes = Lanes(codelets, config, run)
-        lease_ns = int(config.lease_ms * 1e6)
-        self._dispatch = Dispatch(lease_ns, self._lanes.dispatches)
+        self._delay = AnswerDelay(config)
+        self._dispatch = Dispatch(self._delay.lease_ns, self._lanes.dispatches)
         self._forgetting = Forgetting()
         self._individuals = Individuals(self._ledger.graph)
         offering = [name for name in OFFERING if run.has_any(name)]
@@ -107,9 +108,10 @@ class Workspace:
 
     def notes(self) -> list[str]:
         """Return what its health reports in words."""
-        if not self._late_views:
-            return []
-        return [f"{self._late_views} times percepts were older than those before them"]
+        notes = [*self._delay.notes(), *self._dispatch.notes(self._now_ns)]
+        if self._late_views:
+            notes.append(f"{self._late_views} times percepts were older than those before them")
+        return notes
 
     def on_motion(self, motion: SelfMotion) -> list[Message]:
         """Keep what moved until a cycle moves the self node by it."""
@@ -183,6 +185,7 @@ class Workspace:
         given to who answers it.
         """
         if self._dispatch.answer(proposal) or self._lanes.answer(proposal):
+            self._delay.answer(proposal.task_id, self._now_ns)
             return self._continue_if_complete([])
 
         holders = self._late.get(proposal.task_id)
@@ -190,6 +193,7 @@ class Workspace:
             return []
 
         check_holder(proposal, holders)
+        self._delay.answer(proposal.task_id, self._now_ns)
         del self._late[proposal.task_id]
         if not self._ledger.validate([proposal]):
             return []
@@ -219,7 +223,8 @@ class Workspace:
         return self._continue_if_complete(published)
 
     def on_clock(self, clock: Clock) -> list[Message]:
-        """Revoke leases that have ended, and end a cycle at its deadline: in real time alone.
+        """Revoke leases that have ended, and end a cycle at its deadline: in real time alone. Both
+        follow the delay of answers.
 
         Each clock counts, even if earlier than the one before: else, after one that ran far ahead,
         no later deadline would be kept.
@@ -232,11 +237,10 @@ class Workspace:
         if self._context is None:
             return published
 
-        deadline_ns = self._context.stamp_ns + self._config.deadline_ms * 1e6
-        if self._now_ns > deadline_ns:
+        if self._now_ns > self._delay.deadline_ns(self._context.stamp_ns):
             published += self._commit_answers()
             published += self._lanes.begin(self._context, self._ledger, self._now_ns)
-            return [*published, *self._end()]
+            return [*published, *self._end(is_cut=True)]
 
         published += self._dispatch.expire(self._now_ns)
         return self._continue_if_complete(published)
@@ -315,6 +319,7 @@ class Workspace:
                 entered, self._moved_until_ns, graph.cycle, graph.version
             )
             self._phase = PLACE_OF.get(graph.phase, -1)
+            self._delay.begin(percepts.stamp_ns, self._now_ns)
             return self._next_phase()
 
         # A cycle that a kill interrupted, and whose view will not come again, ends.
@@ -337,6 +342,7 @@ class Workspace:
         entered, waiting = self._individuals.labelled(percepts, motions)
         context = self._sensed.context(entered, moved_ns, graph.cycle + 1, graph.version)
         self._context = replace(context, waiting=waiting)
+        self._delay.begin(percepts.stamp_ns, self._now_ns)
         self._phase = -1
         self._is_repeated = False
 
@@ -385,6 +391,8 @@ class Workspace:
             if codelet.codelet.phase is phase:
                 tasks += codelet.due(context, graph)
 
+        self._delay.ask(phase, [task.task_id for task in tasks], self._now_ns)
+        self._dispatch.lease_ns = self._delay.lease_ns
         published = self._dispatch.begin(tasks, self._now_ns)
         return self._continue_if_complete([*published, *beside])
 
@@ -429,12 +437,15 @@ class Workspace:
             published += proposal.events
         return published
 
-    def _end(self) -> list[Message]:
-        """Commit what lanes have answered, forget what has decayed, and begin the next cycle."""
+    def _end(self, *, is_cut: bool = False) -> list[Message]:
+        """Commit what lanes have answered, forget what has decayed, and begin the next cycle. The
+        cycle `is_cut` if answers of it had not come.
+        """
         context = self._context
         if context is None:
             return []
 
+        self._delay.end(self._now_ns, context.stamp_ns, is_cut=is_cut)
         published: list[Message] = []
         for answers, failed in self._lanes.collect(context.cycle):
             self._reject_failed(failed)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import msgspec
 
 from cogmap.errors import MessageError
+from cogmap.runtime.notes import note
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
 
@@ -16,6 +17,10 @@ from cogmap.schemas.codelets import Assignment, Leases, Proposal, Task
 BUSY = 1000
 MAX_ATTEMPTS = 5
 """Workers that a task is given to before it has failed: one that kills each must end."""
+REST_NS = 5_000_000_000
+"""A worker that kept a task for longer than its lease gets others last for so long."""
+TOLD_NS = 3 * REST_NS
+"""For so long it is told."""
 
 
 @dataclass
@@ -40,18 +45,32 @@ class Lease:
         return self.proposal is None
 
 
+@dataclass
+class _Overdue:
+    """How many leases of a worker have ended, and when the last did."""
+
+    leases: int = 0
+    at_ns: int = 0
+
+    def is_within(self, time_ns: int, now_ns: int) -> bool:
+        """Return whether the last ended that long ago at most: by clocks, which may go back."""
+        return 0 <= now_ns - self.at_ns <= time_ns
+
+
 class Dispatch:
-    """Gives each task to the least loaded worker; to one that lost it only if there is no other.
+    """Gives each task to the least loaded worker; to one that lost it only if there is no other,
+    and to one that has lost another lately only if all have.
 
     The same workers and tasks give the same choice. Workers that hold a task of one of the
-    dispatches in `background` count as busy.
+    dispatches in `background` count as busy. A lease lasts `lease_ns`.
     """
 
     def __init__(self, lease_ns: int, background: Callable[[], list[Dispatch]] = list) -> None:
-        self._lease_ns = lease_ns
+        self.lease_ns = lease_ns
         self._background = background
         self._workers: set[str] = set()
         self._leases: dict[str, Lease] = {}
+        self._overdue: dict[str, _Overdue] = {}
 
     def begin(self, tasks: list[Task], now_ns: int) -> list[Message]:
         """Add `tasks`; return what is to be published now. Without a worker they wait for one."""
@@ -66,6 +85,7 @@ class Dispatch:
             self._workers.add(worker)
         else:
             self._workers.discard(worker)
+            self._overdue.pop(worker, None)
             self._revoke(lambda lease: lease.worker == worker)
 
         return self._assign(now_ns)
@@ -76,13 +96,19 @@ class Dispatch:
         """
 
         def has_ended(lease: Lease) -> bool:
-            lease.until_ns = min(lease.until_ns, now_ns + self._lease_ns)
+            lease.until_ns = min(lease.until_ns, now_ns + self.lease_ns)
             if now_ns <= lease.until_ns:
                 return False
             others = self._workers - {lease.worker}
             return bool(others)
 
-        self._revoke(has_ended)
+        def is_lost(lease: Lease) -> bool:
+            if not has_ended(lease):
+                return False
+            self._note_overdue(lease.worker, now_ns)
+            return True
+
+        self._revoke(is_lost)
         return self._assign(now_ns)
 
     def repeat(self, now_ns: int) -> list[Message]:
@@ -162,6 +188,29 @@ class Dispatch:
         """Return the open tasks that workers hold."""
         return [lease for lease in self._leases.values() if lease.is_open and lease.worker]
 
+    def notes(self, now_ns: int) -> list[str]:
+        """Say which workers are slow."""
+        notes = []
+        for worker, overdue in sorted(self._overdue.items()):
+            if overdue.is_within(TOLD_NS, now_ns):
+                wrong = (
+                    f"{worker} kept {overdue.leases} tasks for longer than their leases, and gets "
+                    f"others last"
+                )
+                notes.append(note(wrong, f"end other programs where it runs, or end {worker}"))
+        return notes
+
+    def _note_overdue(self, worker: str, now_ns: int) -> None:
+        overdue = self._overdue.setdefault(worker, _Overdue())
+        if not overdue.is_within(TOLD_NS, now_ns):
+            overdue.leases = 0
+        overdue.leases += 1
+        overdue.at_ns = now_ns
+
+    def _rests(self, worker: str, now_ns: int) -> bool:
+        overdue = self._overdue.get(worker)
+        return overdue is not None and overdue.is_within(REST_NS, now_ns)
+
     def _has_failed(self, lease: Lease) -> bool:
         is_waiting = lease.is_open and not lease.worker
         return is_waiting and lease.attempt >= MAX_ATTEMPTS
@@ -189,6 +238,7 @@ class Dispatch:
         for rank, lease in enumerate(held, start=1):
             load[lease.worker] += BUSY * rank
 
+        resting = {worker for worker in self._workers if self._rests(worker, now_ns)}
         tasks: list[Task] = []
         assignments: list[Assignment] = []
         for lease in self._leases.values():
@@ -197,11 +247,14 @@ class Dispatch:
                 continue
 
             lost_by = lease.lost_by
-            worker = min(self._workers, key=lambda name: (name == lost_by, load[name], name))
+            worker = min(
+                self._workers,
+                key=lambda name: (name == lost_by, name in resting, load[name], name),
+            )
             load[worker] += 1
             lease.worker = worker
             lease.holders.add(worker)
-            lease.until_ns = now_ns + self._lease_ns
+            lease.until_ns = now_ns + self.lease_ns
             tasks.append(lease.task)
             assignment = Assignment(
                 task_id=lease.task.task_id,

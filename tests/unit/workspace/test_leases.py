@@ -367,3 +367,42 @@ def test_workers_that_never_answer_leave_the_deltas_without_a_gap() -> None:
 
     assert versions == list(range(1, 11))
     assert not any(delta.tasks for delta in desk.deltas)
+
+
+def _slow_worker() -> tuple[Desk, str]:
+    """A workspace two of whose three workers have answered, and the one that let its lease end."""
+    desk, asked = _real_time("w1", "w2", "w3")
+    slow = _holder(desk, asked)
+    desk.clock(_after(0, 101))
+    desk.feed(answer(asked, [_moved_self(0)]))
+    desk.take()
+    return desk, slow
+
+
+def _holders(desk: Desk, frame: int) -> set[str]:
+    """Who gets the tasks of a view, each answered at once."""
+    desk.clock(stamp_ns(frame))
+    desk.see(frame, percept("a"), percept("b"), percept("c"))
+    found = set()
+    while asked := desk.take():
+        found |= {_holder(desk, each) for each in asked}
+        for each in asked:
+            moved = [_moved_self(frame)] if each.codelet == "localization" else []
+            desk.feed(answer(each, moved))
+    return found
+
+
+def test_a_worker_that_let_a_lease_end_gets_no_tasks_for_a_while_and_is_named() -> None:
+    desk, slow = _slow_worker()
+    desk.clock(_after(0, 181))
+
+    assert slow not in _holders(desk, 1)
+    assert desk.module.notes is not None
+    (told,) = desk.module.notes()
+    assert told.startswith(
+        f"{slow} kept 1 tasks for longer than their leases, and gets others last"
+    )
+
+    assert slow in _holders(desk, 30)
+    desk.clock(stamp_ns(100))
+    assert desk.module.notes() == []
