@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections import deque
+from collections import Counter, deque
 
 import psutil
 
@@ -40,9 +40,18 @@ class Meter:
         self._busy_ns += busy_ns
 
     def report(
-        self, intake: Intake, inbox: Inbox, publisher: Publisher, ready: bool, notes: list[str]
+        self,
+        intake: Intake,
+        inbox: Inbox,
+        publisher: Publisher,
+        *,
+        shed: Counter[str],
+        ready: bool,
+        notes: list[str],
     ) -> Health:
-        """Return the counts so far and the busy share since the last report, numbered."""
+        """Return the counts so far and the busy share since the last report, numbered. What was
+        `shed`, by topic, counts as rejected.
+        """
         now_s = time.monotonic()
         since_s = max(1e-9, now_s - self._reported_s)
         busy = self._busy_ns / 1e9 / since_s
@@ -61,7 +70,7 @@ class Meter:
             uptime_s=now_s - self._began_s,
             received=dict(intake.received),
             emitted=dict(publisher.emitted),
-            rejected=dict(intake.rejected),
+            rejected=dict(intake.rejected + shed),
             superseded=dict(inbox.superseded),
             gaps=dict(intake.gaps),
             queued=len(inbox),

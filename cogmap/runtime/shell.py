@@ -12,6 +12,7 @@ from cogmap.bus.depth import cached_messages
 from cogmap.bus.interface import Answer, Arrival, Bus, Member
 from cogmap.errors import MessageError
 from cogmap.graph.replica import Fetched
+from cogmap.runtime.delivery.flood import Flood
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.delivery.plausibility import Plausibility
@@ -48,7 +49,7 @@ class Shell:
 
     `journal` and `counts` keep on disk what a restart must not lose, `outbox` what others may have
     missed, and `store` what the next run is to know. With `health` it publishes its health once a
-    second.
+    second, and sheds floods, of which that tells.
     """
 
     def __init__(
@@ -65,6 +66,7 @@ class Shell:
         self.module = module
         self.bus = bus
         self.inbox = Inbox(keeps_all=module.is_lockstep)
+        self.flood = Flood()
         self.intake = Intake(Plausibility())
         self.meter = Meter(module)
         self.publisher = Publisher(module, bus, journal, counts, store, outbox=outbox)
@@ -111,12 +113,13 @@ class Shell:
                 backfill = self.module.backfill
 
         self.publisher.declare(self._health)
+        put = self.flood.before(self.inbox.put) if self._health else self.inbox.put
         for topic in self.module.handlers:
             if topic is not topics.PRESENCE:
                 history = cached_messages(topic) if topic in backfill else 0
-                self.bus.subscribe(topic, self.inbox.put, _leave_to_numbers, history)
+                self.bus.subscribe(topic, put, _leave_to_numbers, history)
         if self._heartbeats is not None and topics.HEALTH not in self.module.handlers:
-            self.bus.subscribe(topics.HEALTH, self.inbox.put, _leave_to_numbers)
+            self.bus.subscribe(topics.HEALTH, put, _leave_to_numbers)
         for request, (reply, handler) in self.module.served.items():
             answer = self._server(request, handler)
             self.bus.serve(request, reply, answer, self.inbox.call)
@@ -148,9 +151,7 @@ class Shell:
             return False
 
         if isinstance(item, Arrival):
-            for missed in self._recovery.before(item):
-                self._receive(missed)
-            self._receive(item)
+            self._receive_after_missed(item)
         else:
             item()
         return True
@@ -192,6 +193,7 @@ class Shell:
         if self.meter.faults:
             notes.append(f"{self.meter.faults} faults: run with --verbose to see them")
         notes.extend(self.intake.notes())
+        notes.extend(self.flood.notes())
         if self.module.notes is not None:
             notes.extend(self.module.notes())
         if self._heartbeats is not None:
@@ -202,6 +204,18 @@ class Shell:
     @property
     def _observes_presence(self) -> bool:
         return topics.PRESENCE in self.module.handlers
+
+    def _receive_after_missed(self, arrival: Arrival) -> None:
+        """Receive an arrival after those that are missing before it: not what was shed, and nothing
+        for one that does not count.
+        """
+        if not arrival.refused:
+            shed = self.flood.skipped(arrival)
+            if shed is not None:
+                self.intake.resume(arrival.topic, shed)
+            for missed in self._recovery.before(arrival):
+                self._receive(missed)
+        self._receive(arrival)
 
     def _receive(self, arrival: Arrival) -> None:
         received_ns = time.time_ns()
@@ -347,7 +361,12 @@ class Shell:
 
     def _publish_health(self, now_ns: int) -> None:
         health = self.meter.report(
-            self.intake, self.inbox, self.publisher, self._started, self.notes
+            self.intake,
+            self.inbox,
+            self.publisher,
+            shed=self.flood.shed,
+            ready=self._started,
+            notes=self.notes,
         )
         self.publisher.send_health(health)
 

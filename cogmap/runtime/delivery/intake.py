@@ -137,13 +137,13 @@ class Intake:
         topic = arrival.topic
         envelope = arrival.envelope
         try:
+            if arrival.refused:
+                raise MessageError(f"{topic.name}: {arrival.refused}")
             message = decode(topic, arrival.payload)
             if envelope is None:
                 raise MessageError(f"{topic.name}: no envelope")
             if (envelope.source, envelope.seq) != (message.source, message.seq):
                 raise MessageError(f"{topic.name}: envelope and message name different sources")
-            if arrival.refused:
-                raise MessageError(f"{topic.name}: {arrival.refused}")
             if self._plausibility is not None:
                 self._plausibility.check(topic, message, time.monotonic_ns())
             if topic.delivery is Delivery.NEVER_DROP:
