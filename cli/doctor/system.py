@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 
 from cogmap.bus.discovery import Role, System
@@ -19,6 +19,10 @@ RATE_TOLERANCE = 0.3
 MIN_MEASURED_HZ = 1.0
 LONG_QUEUE = 10
 MIN_REPORTS = 2
+FAR_MORE = 2.0
+FAR_MORE_HZ = 20.0
+"""So many times as many, and so many more a second, no process explains that reports now and then.
+"""
 
 
 def examine(expected: Iterable[str], observed: Observed, system: System) -> list[Finding]:
@@ -45,6 +49,7 @@ def examine(expected: Iterable[str], observed: Observed, system: System) -> list
         *(finding for _, finding in refused if finding not in too_old),
         *(moment.slow_machine(observed, late) or late),
         *contradictions(system),
+        *unknown_publishers(observed),
         *truth_leaks(modules, system),
     ]
 
@@ -154,16 +159,45 @@ def rates_hz(reports_of: Iterable[list[Health]]) -> dict[str, float]:
     """Compute the rate of each published topic, between each instance's first and last report."""
     rates: dict[str, float] = {}
     for reports in reports_of:
-        first = reports[0]
-        last = reports[-1]
-        span_s = last.uptime_s - first.uptime_s
-        if len(reports) < MIN_REPORTS or span_s <= 0:
-            continue
-
-        for name, number in last.emitted.items():
-            published = number - first.emitted.get(name, 0)
-            rates[name] = rates.get(name, 0.0) + published / span_s
+        for name, rate_hz in _rates_hz(reports, lambda report: report.emitted).items():
+            rates[name] = rates.get(name, 0.0) + rate_hz
     return rates
+
+
+def _rates_hz(
+    reports: list[Health], counts: Callable[[Health], dict[str, int]]
+) -> dict[str, float]:
+    """Compute how fast the counts of one instance grow, by topic, between its first and last
+    report.
+    """
+    first = reports[0]
+    last = reports[-1]
+    span_s = last.uptime_s - first.uptime_s
+    if len(reports) < MIN_REPORTS or span_s <= 0:
+        return {}
+    before = counts(first)
+    return {name: (number - before.get(name, 0)) / span_s for name, number in counts(last).items()}
+
+
+def unknown_publishers(observed: Observed) -> Iterator[Finding]:
+    """Yield a finding for each topic of which an instance receives far more than all processes
+    publish that report their health.
+    """
+    published = rates_hz(observed.health.values())
+    received: dict[str, float] = {}
+    for reports in observed.health.values():
+        for name, rate_hz in _rates_hz(reports, lambda report: report.received).items():
+            received[name] = max(rate_hz, received.get(name, 0.0))
+
+    for name, rate_hz in sorted(received.items()):
+        known_hz = published.get(name, 0.0)
+        if rate_hz > FAR_MORE * known_hz + FAR_MORE_HZ:
+            yield Finding(
+                name,
+                f"{rate_hz:.0f} Hz are received, and those who report their health publish "
+                f"{known_hz:.1f} Hz",
+                "find out who else publishes it, and end that",
+            )
 
 
 def contradictions(system: System) -> Iterator[Finding]:

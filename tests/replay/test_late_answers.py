@@ -31,6 +31,7 @@ from cogmap.services import registry
 MS = 1_000_000
 PERIOD_NS = 200 * MS
 DEADLINE_NS = 180 * MS
+LONGEST_NS = 1000 * MS
 SECTIONS = {"workspace": {"deadline_ms": 180.0, "lease_ms": 120.0}}
 
 
@@ -140,3 +141,22 @@ def test_late_dropped_and_refused_answers_replay_to_the_same_deltas(tmp_path: Pa
     assert report.same, report.first
     (outcome,) = report.outcomes
     assert outcome.same >= len(session.deltas) + len(session.tasks)
+
+
+def test_a_deadline_that_follows_late_answers_replays_to_the_same_deltas(tmp_path: Path) -> None:
+    path = tmp_path / "log.mcap"
+    session = Session(path)
+    for view in range(8):
+        frame = 10 * view
+        stamp_ns = (frame + 1) * PERIOD_NS
+        session.publish(Clock(stamp_ns=stamp_ns))
+        localization = session.see(frame)
+        session.publish(Clock(stamp_ns=stamp_ns + DEADLINE_NS + 20 * MS))
+        session.answer(localization)
+        session.publish(Clock(stamp_ns=stamp_ns + LONGEST_NS + MS))
+    session.end()
+
+    answered = [delta.phase for delta in session.deltas if delta.tasks]
+    assert answered == [*[Phase.LATE] * 5, *[Phase.LOCALIZATION] * 3]
+    report = replay_into(path, ["workspace"], registry.build, processes=1)
+    assert report.same, report.first

@@ -25,28 +25,35 @@ CALM_S = 1.0
 REFUSED_BURST = 100.0
 REFUSED_HZ = 20.0
 """Of messages that are refused anyway, so many are read, to be logged: the others are counted."""
-MAX_SOURCES = 4096
+MAX_SENDERS = 4096
 MAX_NOTES = 4
 LOG_PERIOD_S = 10.0
-_ANYBODY = ""
 
-_Key = tuple[Topic, str, bool]
+_Key = tuple[Topic, str | None]
 
 
-@dataclass
-class _Budget:
-    """How many messages may come: `burst` at once, and `rate_hz` on average.
+@dataclass(slots=True)
+class _Sender:
+    """A source of a topic, or all of whom messages are refused: `burst` messages may come at once,
+    and `rate_hz` on average.
 
     What comes beyond counts too: `left` falls below zero, and while a flood lasts none comes in.
+    `shed` were left out, of them `last` the last, and that was logged at `logged_s`.
     """
 
+    topic: Topic
+    source: str
+    is_refused: bool
     burst: float
     rate_hz: float
     left: float
     at_s: float
+    shed: int = 0
+    last: Envelope | None = None
+    logged_s: float = -math.inf
 
     def admits(self, now_s: float) -> bool:
-        """Take account of a message. Returns whether it may come in."""
+        """Take account of a message. Returns whether it comes in."""
         passed_s = now_s - self.at_s
         self.at_s = now_s
         self.left = min(self.burst, self.left + passed_s * self.rate_hz) - 1
@@ -55,14 +62,13 @@ class _Budget:
         self.left = max(self.left, -CALM_S * self.rate_hz)
         return False
 
-
-@dataclass
-class _Shed:
-    """What was shed of a source on a topic: the last of it, how many, and when that was logged."""
-
-    last: Envelope | None = None
-    number: int = 0
-    logged_s: float = -math.inf
+    def note(self) -> str:
+        """Say how much of it was shed."""
+        shed = f"{self.shed} messages of {self.topic.name}"
+        if self.is_refused:
+            wrong = f"{shed} were shed that would be refused anyway"
+            return note(wrong, "see in the log who sends them")
+        return note(f"{shed} of {self.source} were shed, as a flood", f"end {self.source}")
 
 
 class Flood:
@@ -76,8 +82,7 @@ class Flood:
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
         self.shed: Counter[str] = Counter()
-        self._budgets: dict[_Key, _Budget] = {}
-        self._sheds: dict[_Key, _Shed] = {}
+        self._senders: dict[_Key, _Sender] = {}
         self._lock = threading.Lock()
 
     def before(self, deliver: Callable[[Arrival], None]) -> Callable[[Arrival], None]:
@@ -91,82 +96,70 @@ class Flood:
 
     def admits(self, arrival: Arrival) -> bool:
         """Take account of an arrival. Returns whether it comes in."""
-        key = _key(arrival)
         now_s = self._clock()
         with self._lock:
-            budget = self._budgets.get(key)
-            if budget is None:
-                budget = self._begin(key, now_s)
-            if budget.admits(now_s):
+            sender = self._sender(arrival, now_s)
+            if sender.admits(now_s):
                 return True
-            self._leave_out(key, arrival, now_s)
-            return False
+
+            sender.shed += 1
+            sender.last = arrival.envelope
+            self.shed[sender.topic.name] += 1
+            is_told = sender.is_refused or now_s < sender.logged_s + LOG_PERIOD_S
+            if is_told:
+                return False
+            sender.logged_s = now_s
+
+        log.warning("%s: %s sends a flood, which is shed", sender.topic.name, sender.source)
+        return False
 
     def skipped(self, arrival: Arrival) -> Envelope | None:
         """Return the last message that was shed before `arrival`, of its source and topic, once:
         it and those before are not to be fetched.
         """
-        envelope = arrival.envelope
-        shed = self._sheds.get(_key(arrival))
-        if envelope is None or shed is None or shed.last is None:
+        sender = self._senders.get(_key(arrival))
+        if sender is None or sender.last is None:
             return None
 
         with self._lock:
-            last = shed.last
-            is_after = envelope.incarnation != last.incarnation or envelope.seq > last.seq
-            if not is_after:
+            last = sender.last
+            envelope = arrival.envelope
+            is_same_life = envelope is not None and envelope.incarnation == last.incarnation
+            if is_same_life and envelope is not None and envelope.seq < last.seq:
                 return None
-            shed.last = None
-        return last if envelope.incarnation == last.incarnation else None
+            sender.last = None
+        return last if is_same_life else None
 
     def notes(self) -> list[str]:
         """Say of whom how much was shed, the most first."""
         with self._lock:
-            sheds = [(shed.number, key) for key, shed in self._sheds.items()]
-        sheds.sort(key=lambda each: -each[0])
-        notes = []
-        for number, (topic, source, is_refused) in sheds[:MAX_NOTES]:
-            if is_refused:
-                wrong = f"{number} messages of {topic.name} were shed that would be refused anyway"
-                notes.append(note(wrong, "see in the log who sends them"))
-            else:
-                wrong = f"{number} messages of {topic.name} of {source} were shed, as a flood"
-                notes.append(note(wrong, f"end {source}"))
-        return notes
+            flooding = [sender for sender in self._senders.values() if sender.shed]
+        flooding.sort(key=lambda sender: -sender.shed)
+        return [sender.note() for sender in flooding[:MAX_NOTES]]
 
-    def _begin(self, key: _Key, now_s: float) -> _Budget:
-        if len(self._budgets) >= MAX_SOURCES:
-            del self._budgets[next(iter(self._budgets))]
+    def _sender(self, arrival: Arrival, now_s: float) -> _Sender:
+        key = _key(arrival)
+        sender = self._senders.get(key)
+        if sender is not None:
+            return sender
 
-        topic, _, is_refused = key
-        rate_hz = FASTEST * flow_of(topic).rate_hz
-        burst = KEPT_S * flow_of(topic).rate_hz
-        if is_refused:
-            rate_hz, burst = REFUSED_HZ, REFUSED_BURST
-        budget = _Budget(burst, rate_hz, burst, now_s)
-        self._budgets[key] = budget
-        return budget
-
-    def _leave_out(self, key: _Key, arrival: Arrival, now_s: float) -> None:
-        """Count what is shed, and log it now and then."""
-        if key not in self._sheds and len(self._sheds) >= MAX_SOURCES:
-            del self._sheds[next(iter(self._sheds))]
-
-        topic, source, is_refused = key
-        shed = self._sheds.setdefault(key, _Shed())
-        shed.number += 1
-        shed.last = arrival.envelope
-        self.shed[topic.name] += 1
-        if not is_refused and now_s - shed.logged_s >= LOG_PERIOD_S:
-            shed.logged_s = now_s
-            log.warning("%s: %s sends a flood, which is shed", topic.name, source)
+        if len(self._senders) >= MAX_SENDERS:
+            del self._senders[next(iter(self._senders))]
+        topic, source = key
+        is_refused = source is None
+        rate_hz, burst = REFUSED_HZ, REFUSED_BURST
+        if not is_refused:
+            usual_hz = flow_of(topic).rate_hz
+            rate_hz, burst = FASTEST * usual_hz, KEPT_S * usual_hz
+        sender = _Sender(topic, source or "", is_refused, burst, rate_hz, burst, now_s)
+        self._senders[key] = sender
+        return sender
 
 
 def _key(arrival: Arrival) -> _Key:
     """Return whose budget an arrival is taken from: all that is refused shares one, since anybody
     may state any source in it.
     """
-    is_refused = bool(arrival.refused) or arrival.envelope is None
-    if is_refused or arrival.envelope is None:
-        return arrival.topic, _ANYBODY, True
-    return arrival.topic, arrival.envelope.source, False
+    if arrival.refused or arrival.envelope is None:
+        return arrival.topic, None
+    return arrival.topic, arrival.envelope.source

@@ -13,9 +13,10 @@ from cogmap.bus.interface import Member
 from cogmap.cli.doctor import installation
 from cogmap.cli.doctor.observed import Observed
 from cogmap.cli.doctor.system import examine
+from cogmap.runtime.notes import LATE_ANSWERS, note
 from cogmap.schemas import topics
 from cogmap.schemas.process import Health, Paused
-from cogmap.schemas.sensing import MotorCommand
+from cogmap.schemas.sensing import MotorCommand, SpeedLimit
 from cogmap.schemas.topics import Topic
 
 SENSORY = Member("sensory", "sensory")
@@ -246,3 +247,35 @@ def test_a_recording_has_rates_of_its_own() -> None:
 
     assert any("the table has" in finding for finding in findings(played))
     assert examine(["player", "sensory"], played, system()) == []
+
+
+def test_a_topic_of_which_more_is_received_than_modules_publish_is_named() -> None:
+    reports = [health(at_s, received={"sensory/motion": int(450 * at_s)}) for at_s in (1.0, 2.0)]
+
+    assert findings(observed(*reports)) == [
+        "sensory/motion: 450 Hz are received, and those who report their health publish 0.0 Hz: "
+        "find out who else publishes it, and end that"
+    ]
+
+
+def test_a_note_that_states_its_remedy_is_shown_with_it() -> None:
+    told = note("answers come 200 ms after their tasks", "shorten the way")
+    found = findings(observed(health(1.0), health(2.0, notes=[told, "something else"])))
+
+    assert found == [
+        "sensory: answers come 200 ms after their tasks: shorten the way",
+        "sensory: something else: see its log",
+    ]
+
+
+def test_where_answers_are_late_by_their_way_the_machine_is_not_blamed() -> None:
+    slow = MotorCommand(
+        stamp_ns=1, left_wheel_rad_s=1, right_wheel_rad_s=1, slowed_by=SpeedLimit.POSE_AGE
+    )
+    for notes in ([], [note(f"{LATE_ANSWERS} 200 ms after their tasks", "shorten the way")]):
+        seen = observed(health(1.0), health(2.0, notes=notes))
+        for _ in range(10):
+            seen.add(slow)
+        found = findings(seen)
+
+        assert any(finding.startswith("machine") for finding in found) is not bool(notes)
