@@ -13,6 +13,7 @@ from cogmap.bus.interface import Arrival, Bus, Member
 from cogmap.cli.launch.plan import OBSERVER
 from cogmap.cli.launch.tally import FOLLOWED, Tally
 from cogmap.graph.replica import Replica, snapshot_over
+from cogmap.runtime.delivery.flood import Flood
 from cogmap.runtime.delivery.inbox import Inbox
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.delivery.plausibility import Plausibility
@@ -31,14 +32,16 @@ class Watch:
         self.present: set[Member] = set()
         self._bus = bus
         self._inbox = Inbox()
+        self._flood = Flood()
         self._intake = Intake(Plausibility())
 
         self._published: Counter[Topic] = Counter()
         self._incarnation = time.time_ns()
         for topic in PUBLISHED:
             bus.declare(topic)
+        put = self._flood.before(self._inbox.put)
         for topic in FOLLOWED:
-            bus.subscribe(topic, self._inbox.put, self._intake.count_lost)
+            bus.subscribe(topic, put, self._intake.count_lost)
         bus.watch(self._on_presence)
         bus.announce(Member(OBSERVER, OBSERVER))
 
@@ -56,6 +59,9 @@ class Watch:
         while item is not None:
             if isinstance(item, Arrival):
                 moved |= item.topic is not topics.HEALTH
+                shed = self._flood.skipped(item)
+                if shed is not None:
+                    self._intake.resume(item.topic, shed)
                 self.tally.receive(item, self._intake)
             else:
                 item()
@@ -91,7 +97,7 @@ class Watch:
 
     def rejected(self) -> dict[str, int]:
         """Count messages that were rejected, by topic, summed over those who rejected them."""
-        return self.tally.rejected(self._intake.rejected)
+        return self.tally.rejected(self._intake.rejected + self._flood.shed)
 
     def close(self) -> None:
         """Leave the bus."""

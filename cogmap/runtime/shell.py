@@ -18,6 +18,7 @@ from cogmap.runtime.delivery.intake import Intake
 from cogmap.runtime.delivery.plausibility import Plausibility
 from cogmap.runtime.delivery.publisher import Computation, Publisher
 from cogmap.runtime.delivery.recovery import Recovery
+from cogmap.runtime.delivery.turns import Turns
 from cogmap.runtime.follower import Follower
 from cogmap.runtime.health import Meter
 from cogmap.runtime.heartbeats import Change, Heartbeats
@@ -49,7 +50,8 @@ class Shell:
 
     `journal` and `counts` keep on disk what a restart must not lose, `outbox` what others may have
     missed, and `store` what the next run is to know. With `health` it publishes its health once a
-    second, and sheds floods, of which that tells.
+    second, and sheds floods, of which that tells; a source with a long backlog takes turns with the
+    others then.
     """
 
     def __init__(
@@ -67,6 +69,7 @@ class Shell:
         self.bus = bus
         self.inbox = Inbox(keeps_all=module.is_lockstep)
         self.flood = Flood()
+        self._turns = Turns(self.inbox.put, self.inbox.call, self._receive_after_missed)
         self.intake = Intake(Plausibility())
         self.meter = Meter(module)
         self.publisher = Publisher(module, bus, journal, counts, store, outbox=outbox)
@@ -113,7 +116,7 @@ class Shell:
                 backfill = self.module.backfill
 
         self.publisher.declare(self._health)
-        put = self.flood.before(self.inbox.put) if self._health else self.inbox.put
+        put = self.flood.before(self._turns.put) if self._health else self.inbox.put
         for topic in self.module.handlers:
             if topic is not topics.PRESENCE:
                 history = cached_messages(topic) if topic in backfill else 0
@@ -151,6 +154,7 @@ class Shell:
             return False
 
         if isinstance(item, Arrival):
+            self._turns.taken(item)
             self._receive_after_missed(item)
         else:
             item()
@@ -364,6 +368,7 @@ class Shell:
             self.intake,
             self.inbox,
             self.publisher,
+            queued=len(self.inbox) + len(self._turns),
             shed=self.flood.shed,
             ready=self._started,
             notes=self.notes,

@@ -108,7 +108,9 @@ class Workspace:
 
     def notes(self) -> list[str]:
         """Return what its health reports in words."""
-        notes = [*self._delay.notes(), *self._dispatch.notes(self._now_ns)]
+        notes = []
+        if not self._is_lockstep:
+            notes += [*self._delay.notes(), *self._dispatch.notes(self._now_ns)]
         if self._late_views:
             notes.append(f"{self._late_views} times percepts were older than those before them")
         return notes
