@@ -313,6 +313,8 @@ class Shell:
     ) -> Callable[[bytes], Answer]:
         def answer(payload: bytes) -> Answer:
             try:
+                if self._health and not self.flood.admits_request(request):
+                    raise MessageError(f"{request.name}: too many ask for it at once")
                 reply = handler(decode(request, payload))
             except MessageError as error:
                 self.intake.reject(request.name, str(error))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from statistics import median
 
@@ -16,12 +16,12 @@ WINDOW = 50
 """So many cycles, ten seconds of them, are what it goes by and tells of."""
 MIN_MEASURED = 5
 """One answer that was late is a stray, so many are a delay."""
-MARGIN = 1.5
-"""How many times the usual delay a phase may take, and a worker: it is measured by clocks, which
-come each 50 ms.
-"""
 OFTEN = 0.2
-"""The share of cycles beyond which it is told that they end without answers, or wait for long."""
+"""The share of cycles beyond which it is told that they end without answers, or wait for long. What
+the others take is usual.
+"""
+MARGIN = 1.25
+"""How many times the usual delay a phase may take, and a worker."""
 WORKING = (Phase.LOCALIZATION, Phase.OBJECTS, Phase.ATTENTION)
 """The phases of each cycle that have tasks."""
 MAX_ROUNDS = 256
@@ -109,8 +109,10 @@ class AnswerDelay:
         often = OFTEN * WINDOW
         if not usual_ns or max(without, waited) < often:
             return []
-
         needed_ns = median(self._ages_ns) + self._expected_ns
+        if needed_ns <= self._deadline_ns:
+            return []
+
         remedy = "shorten the way between the workspace and its codelets, or end other programs"
         if without >= often and needed_ns > self._longest_ns:
             needed_ms = STEP_MS * math.ceil(needed_ns / MS_NS / STEP_MS)
@@ -124,10 +126,10 @@ class AnswerDelay:
         return [note(wrong, remedy)]
 
     @property
-    def _usual_ns(self) -> dict[Phase, float]:
+    def _usual_ns(self) -> dict[Phase, int]:
         """Return how long each phase usually takes, of those that were measured often enough."""
         taken = self._took_ns.items()
-        return {phase: median(took) for phase, took in taken if len(took) >= MIN_MEASURED}
+        return {phase: _usual(took) for phase, took in taken if len(took) >= MIN_MEASURED}
 
     @property
     def _expected_ns(self) -> float:
@@ -140,3 +142,8 @@ class AnswerDelay:
         longest_ns = max(usual_ns.values())
         expected = dict.fromkeys(WORKING, longest_ns) | usual_ns
         return MARGIN * sum(expected.values())
+
+
+def _usual(took_ns: Sequence[int]) -> int:
+    """Return what all but the OFTEN longest took."""
+    return sorted(took_ns)[int(len(took_ns) * (1 - OFTEN))]

@@ -25,6 +25,9 @@ CALM_S = 1.0
 REFUSED_BURST = 100.0
 REFUSED_HZ = 20.0
 """Of messages that are refused anyway, so many are read, to be logged: the others are counted."""
+ASKED_BURST = 100.0
+ASKED_HZ = 50.0
+"""So many requests are answered, whoever asks: more than all modules make that start together."""
 MAX_SENDERS = 4096
 MAX_NOTES = 4
 LOG_PERIOD_S = 10.0
@@ -83,6 +86,7 @@ class Flood:
         self._clock = clock
         self.shed: Counter[str] = Counter()
         self._senders: dict[_Key, _Sender] = {}
+        self._asked: dict[Topic, _Sender] = {}
         self._lock = threading.Lock()
 
     def before(self, deliver: Callable[[Arrival], None]) -> Callable[[Arrival], None]:
@@ -112,6 +116,20 @@ class Flood:
 
         log.warning("%s: %s sends a flood, which is shed", sender.topic.name, sender.source)
         return False
+
+    def admits_request(self, request: Topic) -> bool:
+        """Take account of a request: nobody knows whose. Returns whether it is answered. While too
+        many ask, some are answered all the same.
+        """
+        now_s = self._clock()
+        with self._lock:
+            asked = self._asked.get(request)
+            if asked is None:
+                asked = _Sender(request, "", True, ASKED_BURST, ASKED_HZ, ASKED_BURST, now_s)
+                self._asked[request] = asked
+            is_answered = asked.admits(now_s)
+            asked.left = max(0.0, asked.left)
+        return is_answered
 
     def skipped(self, arrival: Arrival) -> Envelope | None:
         """Return the last message that was shed before `arrival`, of its source and topic, once:

@@ -11,7 +11,14 @@ from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.depth import KEPT_S, flow_of
 from cogmap.bus.interface import Arrival, Sent
 from cogmap.bus.memory import MemoryBus, MemoryNetwork
-from cogmap.runtime.delivery.flood import CALM_S, FASTEST, REFUSED_BURST, Flood
+from cogmap.runtime.delivery.flood import (
+    ASKED_BURST,
+    ASKED_HZ,
+    CALM_S,
+    FASTEST,
+    REFUSED_BURST,
+    Flood,
+)
 from cogmap.runtime.module import Module
 from cogmap.runtime.notes import wrong_and_remedy
 from cogmap.runtime.shell import Shell
@@ -96,6 +103,16 @@ def test_what_is_refused_is_read_for_a_while_whatever_source_it_states() -> None
     assert flood.admits(_arrival(0, "source-1"))
     (told,) = flood.notes()
     assert told.startswith(f"{number - came} messages of epam/percepts were shed that would be")
+
+
+def test_of_many_requests_as_many_are_answered_as_all_modules_make_and_some_of_the_others() -> None:
+    door = Door()
+    burst = [door.flood.admits_request(topics.SNAPSHOT_REQUEST) for _ in range(300)]
+    assert burst == [True] * int(ASKED_BURST) + [False] * (300 - int(ASKED_BURST))
+
+    door.now_s += 2.5 / ASKED_HZ
+    later = [door.flood.admits_request(topics.SNAPSHOT_REQUEST) for _ in range(3)]
+    assert later == [True, True, False]
 
 
 class Flooded:
