@@ -65,7 +65,7 @@ class Workspace:
         self._forgetting = Forgetting()
         self._individuals = Individuals(self._ledger.graph)
         offering = [name for name in OFFERING if run.has_any(name)]
-        self._offers = Offers(offering if run.lockstep else ())
+        self._offers = Offers(offering if run.lockstep else (), len(config.goals))
         self._consciousness = Consciousness(run.lockstep and run.has_any(COMPETITION))
 
         self._sensed = Sensed(run)

@@ -26,16 +26,20 @@ has a few goals, and memory returns a few objects at a time. More would hold up 
 """
 
 MAX_GOALS = 64
-"""Goals that the agent has at once, at most: planning takes longer for each."""
+"""Goals that the agent has at once, at most, beside those that it was given at its start: planning
+takes longer for each.
+"""
 
 
 class Offers:
     """The offers that wait for the next cycle.
 
     Each cycle waits for an offer of each of the instances `awaited`, made after the cycle before.
+    `given` is how many goals the agent has from its start.
     """
 
-    def __init__(self, awaited: Iterable[str]) -> None:
+    def __init__(self, awaited: Iterable[str], given: int = 0) -> None:
+        self._max_goals = MAX_GOALS + given
         self._awaited = frozenset(awaited)
         self._newest_cycle: dict[str, int] = {}
         self._waiting: list[Offer] = []
@@ -119,7 +123,7 @@ class Offers:
                     else:
                         operations.append(operation)
 
-        operations = _within_goals(operations, ledger)
+        operations = _within_goals(operations, ledger, self._max_goals)
         return _with_objects(operations, ledger, entering)
 
     def _over_quota(self, source: str, size: int, most: int) -> str:
@@ -133,8 +137,8 @@ class Offers:
         )
 
 
-def _within_goals(operations: list[Operation], ledger: Ledger) -> list[Operation]:
-    """Reject each new goal beyond MAX_GOALS."""
+def _within_goals(operations: list[Operation], ledger: Ledger, most: int) -> list[Operation]:
+    """Reject each new goal beyond so many."""
     graph = ledger.graph
     goals = {goal.id for goal in graph.of_kind(Goal)}
     accepted: list[Operation] = []
@@ -142,10 +146,8 @@ def _within_goals(operations: list[Operation], ledger: Ledger) -> list[Operation
         if isinstance(operation, DropNode):
             goals.discard(operation.id)
         elif isinstance(operation, Goal):
-            if operation.id not in goals and len(goals) >= MAX_GOALS:
-                ledger.reject(
-                    f"an offer of {operation.id}: the agent has {MAX_GOALS} goals, no more"
-                )
+            if operation.id not in goals and len(goals) >= most:
+                ledger.reject(f"an offer of {operation.id}: the agent has {most} goals, no more")
                 continue
             goals.add(operation.id)
         accepted.append(operation)

@@ -14,6 +14,7 @@ from cogmap.schemas.graph import Phase
 from cogmap.schemas.nodes import SELF_ID, Goal, Self, goal_id
 from cogmap.schemas.process import Presence
 from cogmap.schemas.sensing import Energy
+from cogmap.services.workspace.config import GivenGoal
 from cogmap.services.workspace.offers import MAX_GOALS, MAX_OF_OTHERS, MAX_OPERATIONS
 from cogmap.testing import percepts, self_motion, stamp_ns
 from tests.support.world.scenes import Desk, answer, thing
@@ -205,6 +206,16 @@ def test_the_agent_takes_so_many_goals_and_no_more_until_some_are_withdrawn() ->
     kept = list(desk.graph.of_kind(Goal))
     assert len(kept) == MAX_GOALS
     assert sum(delta.rejected for delta in desk.deltas) == len(goals) - MAX_GOALS
+
+
+def test_goals_that_the_agent_has_from_its_start_leave_room_for_those_of_a_person() -> None:
+    given = [GivenGoal(name=f"corner {number}", x_m=9.0) for number in range(2 * MAX_GOALS)]
+    desk = Desk("w1", goals=given)
+    desk.drive(range(1))
+    desk.feed(Offer(cycle=1, operations=[Goal(id=goal_id("home"), base_level=1.0)], source="goal"))
+    desk.drive(range(1, 2))
+
+    assert desk.graph.get(Goal, goal_id("home")) is not None
 
 
 def test_the_self_node_of_a_later_time_is_that_of_the_true_view_in_the_end() -> None:
