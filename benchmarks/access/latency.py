@@ -15,7 +15,7 @@ from cogmap.bus.access import site
 from cogmap.bus.access.certificates import now_utc
 from cogmap.bus.access.keys import Keys
 from cogmap.bus.codec import Envelope
-from cogmap.bus.interface import Arrival
+from cogmap.bus.interface import Arrival, Member
 from cogmap.bus.session import free_port, listens
 from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.launch.command_line import cogmap_command, environment
@@ -33,13 +33,19 @@ POLL_S = 0.05
 
 
 class Link:
-    """A publisher and a subscriber of `topic` at one router."""
+    """The module `source` and a subscriber of `topic` at one router."""
 
     def __init__(
-        self, endpoint: str, topic: Topic, keys: tuple[Keys, Keys] | None, closing: ExitStack
+        self,
+        endpoint: str,
+        topic: Topic,
+        source: str,
+        keys: tuple[Keys, Keys] | None,
+        closing: ExitStack,
     ) -> None:
         ours, theirs = keys or (None, None)
         self._topic = topic
+        self._source = source
         self._number = 0
         self._has_come = threading.Event()
         self._arrived_ns = 0
@@ -48,6 +54,7 @@ class Link:
         subscriber.subscribe(topic, self._receive, lambda name, number: None)
         self._publisher = ZenohBus(endpoint, AGENT, keys=ours)
         closing.callback(self._publisher.close)
+        self._publisher.identify(Member(source, source))
         self._publisher.declare(topic)
 
     def _receive(self, arrival: Arrival) -> None:
@@ -56,7 +63,7 @@ class Link:
 
     def send(self, payload: bytes) -> float:
         """Return how many microseconds a message takes. Raises CogmapError if it is lost."""
-        envelope = Envelope("motor", self._number, 1, time.time_ns(), time.time_ns())
+        envelope = Envelope(self._source, self._number, 1, time.time_ns(), time.time_ns())
         self._number += 1
         self._has_come.clear()
         sent_ns = time.perf_counter_ns()
@@ -79,9 +86,10 @@ def measure(folder: Path, messages: int) -> Metrics:
             ("delta_latency", DELTA, DELTA_BYTES, ("workspace", "motor")),
         ):
             ours, theirs = (Keys(place / holder, holder) for holder in holders)
+            source, _ = holders
             links = (
-                Link(plain, topic, None, closing),
-                Link(secured, topic, (ours, theirs), closing),
+                Link(plain, topic, source, None, closing),
+                Link(secured, topic, source, (ours, theirs), closing),
             )
             found |= _compared(name, links, bytes(size), messages)
     return found

@@ -14,7 +14,7 @@ def test_a_late_follower_has_the_graph_though_the_workspace_dies_as_it_joins(
 ) -> None:
     system, feeder, witness = agent
     workspace = system.processes["workspace"]
-    late = Witness(system.bus())
+    late = Witness(system.bus(), "late")
 
     workspace.send(signal.SIGSTOP)
     workspace.end(signal.SIGKILL)
@@ -37,7 +37,7 @@ def test_a_follower_that_joins_begins_with_a_snapshot(
     agent: tuple[System, Feeder, Witness],
 ) -> None:
     system, feeder, witness = agent
-    late = Witness(system.bus())
+    late = Witness(system.bus(), "late")
     version = witness.graph.version
 
     with working(late.shell):

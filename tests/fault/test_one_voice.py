@@ -17,6 +17,7 @@ from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.codelets import Proposal
 from cogmap.schemas.graph import Delta, Phase
+from cogmap.schemas.topics import Topic
 from cogmap.testing import percepts, self_motion
 from tests.support.system.live import Feeder, Witness
 from tests.support.system.processes import AGENT, System, wait_until
@@ -84,6 +85,12 @@ def test_lies_in_the_names_of_all_are_refused_and_silence_nobody(agent: Agent, l
     assert not witness.shell.intake.gaps
 
 
+def _rejected(witness: Witness, topic: Topic) -> int:
+    """How many messages of a topic the workspace has rejected."""
+    health = witness.health.get("workspace")
+    return 0 if health is None else health.rejected.get(topic.name, 0)
+
+
 def test_a_strangers_answers_to_all_tasks_are_refused(agent: Agent, liar: Liar) -> None:
     _, _, witness = agent
     cycle = witness.deltas[-1].cycle
@@ -95,7 +102,7 @@ def test_a_strangers_answers_to_all_tasks_are_refused(agent: Agent, liar: Liar) 
 
     goes_on(agent)
     wait_until(
-        lambda: witness.health["workspace"].rejected.get(topics.PROPOSAL.name, 0) >= 200,
+        lambda: _rejected(witness, topics.PROPOSAL) >= 200,
         "the answers are counted",
     )
 

@@ -39,6 +39,11 @@ def _localized(witness: Witness) -> list[bool]:
     return [cycle in localized for cycle in ended]
 
 
+def _says_so(witness: Witness) -> bool:
+    notes = witness.health["workspace"].notes
+    return any("ms after their tasks" in note for note in notes)
+
+
 def test_cycles_wait_for_answers_that_a_link_makes_late(system: System, far: System) -> None:
     system.modules("codelets-1", "codelets-2")
     far.modules("workspace")
@@ -50,6 +55,4 @@ def test_cycles_wait_for_answers_that_a_link_makes_late(system: System, far: Sys
             lambda: _localized(witness)[-IN_A_ROW:] == [True] * IN_A_ROW,
             f"{IN_A_ROW} cycles in a row are localized",
         )
-
-    notes = witness.health["workspace"].notes
-    assert any("ms after their tasks" in note for note in notes)
+        wait_until(lambda: _says_so(witness), "the workspace says how late answers are")

@@ -76,9 +76,10 @@ def _ignore(message: Message) -> None:
 
 def handled(instance: str) -> list[str]:
     """The topics that an instance subscribes to."""
-    module, _, _ = instance.partition("-")
-    handlers = registry.build(module, {}).handlers
-    return [topic.name for topic in CARRIED if topic in handlers]
+    name, _, _ = instance.partition("-")
+    module = registry.build(name, {})
+    heard = {*module.handlers, *([topics.HEALTH] if module.heartbeats else [])}
+    return [topic.name for topic in CARRIED if topic in heard]
 
 
 def logged(process: Process) -> Counter[str]:

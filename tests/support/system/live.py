@@ -108,14 +108,14 @@ def _motions() -> Array:
 class Witness:
     """Follows the graph, and keeps what else it has received."""
 
-    def __init__(self, bus: Bus) -> None:
+    def __init__(self, bus: Bus, name: str = "witness") -> None:
         self.graph = Graph()
         self.deltas: list[Delta] = []
         self.commands: list[MotorCommand] = []
         self.health: dict[str, Health] = {}
         self.tasks_done: list[str] = []
         self._bus = bus
-        module = Module("witness").following(self.graph, self._on_delta)
+        module = Module("witness", name).following(self.graph, self._on_delta)
         module.on(topics.MOTOR_COMMAND, self.commands.append)
         module.on(topics.HEALTH, self._on_health)
         self.shell = Shell(module, bus)
