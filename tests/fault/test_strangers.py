@@ -138,7 +138,8 @@ def test_bytes_that_are_no_message_are_counted_and_logged_and_change_nothing(
         health = witness.health[instance]
         times = logged(process)
         assert process.is_alive
-        assert not health.notes
+        # A worker may be slow here: that is said, too.
+        assert not [note for note in health.notes if "their leases" not in note]
         assert not health.gaps
         assert set(times) == set(counts)
         assert max(times.values()) <= lasted_s + 1
