@@ -15,7 +15,8 @@ from benchmarks.fuzz.mutations import changed, rewritten
 from benchmarks.fuzz.watch import Findings, described, rss_mb
 from benchmarks.harness import agent_modules, build, town_sections
 from cogmap.bus.codec import Envelope, decode_envelope, encode
-from cogmap.bus.interface import Arrival
+from cogmap.bus.interface import Arrival, Incarnation
+from cogmap.bus.memory import MemoryBus
 from cogmap.errors import CogmapError
 from cogmap.runtime.in_process import InProcessRunner
 from cogmap.schemas import topics
@@ -28,6 +29,9 @@ ANEW_AFTER = 2_000
 WARM_UP = 4_000
 MOST_STEPS = 2_000
 """So many messages of the modules may follow a single one."""
+
+INCARNATION = 1
+"""Of a source that is no module here."""
 
 SHARE_OF_BYTES = 0.4
 """Of the mutations, so many know nothing of MessagePack."""
@@ -42,6 +46,19 @@ class Hail:
         self._whole = {each: _golden(each) for each in topics.ALL}
         self._plain = {each: msgspec.msgpack.decode(self._whole[each]) for each in topics.ALL}
         self._number = 0
+        self._incarnations: dict[str, int] = {}
+
+    def begin(self, runner: InProcessRunner) -> None:
+        """Speak for every source from now on: as the module of that name, or as one that joins."""
+        self._incarnations = {
+            shell.module.instance: shell.publisher.incarnation for shell in runner.shells
+        }
+        bus = MemoryBus(runner.network)
+        for plain in self._plain.values():
+            source = str(plain["source"])
+            if source not in self._incarnations:
+                self._incarnations[source] = INCARNATION
+                bus.claim(Incarnation("fuzz", source, INCARNATION))
 
     def throw(self, runner: InProcessRunner, findings: Findings) -> None:
         """Publish one mutated message, and let the modules handle it and what follows."""
@@ -58,7 +75,8 @@ class Hail:
             plain["stamp_ns"] = self._number * 1_000_000
         source = str(plain["source"])
         now_ns = time.time_ns()
-        envelope = Envelope(source, self._number, 1, now_ns, now_ns)
+        incarnation = self._incarnations.get(source, INCARNATION)
+        envelope = Envelope(source, self._number, incarnation, now_ns, now_ns)
 
         if rng.random() < SHARE_OF_BYTES:
             other = self._whole[rng.choice(self._topics)]
@@ -86,6 +104,7 @@ def _thrown(findings: Findings, seed: str, count: int, until_s: float) -> Findin
     baseline_mb = rss_mb()
     while findings.tried < count and time.monotonic() < until_s:
         with modules() as runner:
+            hail.begin(runner)
             for _ in range(min(ANEW_AFTER, count - findings.tried)):
                 hail.throw(runner, findings)
                 if time.monotonic() > until_s:
