@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 import time
 from collections.abc import Callable
@@ -32,6 +33,7 @@ from cogmap.schemas.topics import Delivery, Scope, Topic
 if TYPE_CHECKING:
     from cogmap.bus.access.keys import Keys
 
+log = logging.getLogger("cogmap")
 # Zenoh delivers on a thread of its own, which at Python's default would wait 5 ms for a module that
 # computes.
 SWITCH_S = 5e-5
@@ -52,6 +54,9 @@ _LARGE_BYTES = 8 * 2**20
 BATCHED_BYTES = 2**17
 TRANSIT_S = 0.002
 POLL_S = 0.05
+# After an answer, whoever else answers is heard for so long: the router says when all have.
+OTHERS_S = 0.1
+OTHERS_POLL_S = 0.001
 
 
 class _Closable(Protocol):
@@ -259,10 +264,12 @@ class ZenohBus:
         for reply in replies:
             if reply.ok is not None:
                 answer = Answer(bytes(reply.ok.payload), _envelope(reply.ok))
-                if self._first_known([answer]):
-                    return answer
-                unknown.append(answer)
-            elif reply.err is not None:
+                if self._first_known([answer]) is None:
+                    unknown.append(answer)
+                    continue
+                self._check_others(request, answer, [*unknown, *_others(replies)])
+                return answer
+            if reply.err is not None:
                 said = bytes(reply.err.payload).decode(errors="replace")
                 reason = f"{request.name}: {said}"
         if not unknown:
@@ -273,9 +280,25 @@ class ZenohBus:
         while time.monotonic() < until_s:
             known = self._first_known(unknown)
             if known is not None:
+                self._check_others(request, known, unknown)
                 return known
             time.sleep(POLL_S)
         raise NoAnswerError(f"{request.name} was answered by somebody who is not on the bus")
+
+    def _check_others(self, request: Topic, answer: Answer, others: list[Answer]) -> None:
+        """Say who else answers. Raises NoAnswerError if somebody in the same name answers something
+        else: nobody can tell which answer is true.
+        """
+        for other in others:
+            if other.payload == answer.payload:
+                continue
+            source = "nobody" if other.envelope is None else other.envelope.source
+            if self._first_known([other]) is None:
+                log.warning("%s: an answer of %s does not count", request.name, source)
+                continue
+            conflict = f"{request.name}: {source} gives unlike answers, somebody else in its name"
+            log.warning("%s", conflict)
+            raise NoAnswerError(conflict)
 
     def _first_known(self, answers: list[Answer]) -> Answer | None:
         """Return the first answer of an incarnation that is on the bus, None if none is."""
@@ -379,6 +402,22 @@ class ZenohBus:
             _, (_, token) = self._claimed.popitem()
             token.undeclare()
         self._session.close()  # type: ignore[no-untyped-call]
+
+
+def _others(replies: zenoh.handlers.Handler[zenoh.Reply]) -> list[Answer]:
+    """Return what else is answered soon."""
+    found = []
+    until_s = time.monotonic() + OTHERS_S
+    while time.monotonic() < until_s:
+        try:
+            reply = replies.try_recv()
+        except zenoh.ZError:
+            break  # all have answered
+        if reply is None:
+            time.sleep(OTHERS_POLL_S)
+        elif reply.ok is not None:
+            found.append(Answer(bytes(reply.ok.payload), _envelope(reply.ok)))
+    return found
 
 
 def encoding(topic: Topic) -> zenoh.Encoding:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 import threading
 import time
+from functools import partial
 from queue import SimpleQueue
 
 import pytest
@@ -225,17 +226,33 @@ def test_what_somebody_answers_who_is_not_on_the_bus_does_not_count(
     lie = Answer(b"lie", replace(ENVELOPE, source="nobody"))
     asker, answerer, *liars = (over_zenoh.join() for _ in range(4))
     for liar in liars:
-        liar.serve(*SNAPSHOTS, lambda _: lie, work)
+        liar.serve(*SNAPSHOTS, partial(_always, lie), work)
         meet(asker, liar)
     with pytest.raises(NoAnswerError, match="was answered by somebody who is not on the bus"):
         asker.query(topics.SNAPSHOT_REQUEST, b"", TIMEOUT_S)
 
     answerer.claim(Incarnation("workspace", ENVELOPE.source, ENVELOPE.incarnation))
-    answerer.serve(*SNAPSHOTS, lambda payload: Answer(b"truth", ENVELOPE), work)
+    answerer.serve(*SNAPSHOTS, partial(_always, Answer(b"truth", ENVELOPE)), work)
     meet(asker, answerer)
 
     for _ in range(5):
         assert asker.query(topics.SNAPSHOT_REQUEST, b"", TIMEOUT_S).payload == b"truth"
+
+
+def test_of_two_unlike_answers_in_one_name_none_counts(over_zenoh: OverZenoh) -> None:
+    asker, *answerers = (over_zenoh.join() for _ in range(3))
+    answers = iter((Answer(b"truth", ENVELOPE), Answer(b"lie", ENVELOPE)))
+    answerers[0].claim(Incarnation("workspace", ENVELOPE.source, ENVELOPE.incarnation))
+    for answerer, answer in zip(answerers, answers, strict=True):
+        answerer.serve(*SNAPSHOTS, partial(_always, answer), work)
+        meet(asker, answerer)
+
+    with pytest.raises(NoAnswerError, match="workspace gives unlike answers"):
+        asker.query(topics.SNAPSHOT_REQUEST, b"", TIMEOUT_S)
+
+
+def _always(answer: Answer, _: bytes) -> Answer:
+    return answer
 
 
 def test_an_error_of_the_answerer_comes_back_in_words(network: Network) -> None:

@@ -16,8 +16,8 @@ least once a second, no flood is.
 """
 
 
-BACK_NS = 30_000_000_000
-"""How far a message is behind the one before, so that it is counted: no answer takes as long."""
+BACK_NS = 5_000_000_000
+"""How far a message is behind the one before, so that it is counted: few answers take as long."""
 MAX_SOURCES = 1024
 
 
@@ -103,9 +103,6 @@ class Returns:
     def follow(self, topic: Topic, message: Message) -> None:
         """Take account of a message."""
         stamp_ns = message.stamp_ns
-        if not stamp_ns:
-            return
-
         key = (topic, message.source)
         behind_ns = self._stamps_ns.pop(key, stamp_ns) - stamp_ns
         self._stamps_ns[key] = stamp_ns
