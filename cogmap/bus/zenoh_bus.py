@@ -93,6 +93,8 @@ class ZenohBus:
         self._claimed: dict[str, tuple[int, _Closable]] = {}
         self._gate = Gate()
         self._watches_incarnations = False
+        self._doubted = 0
+        self._last_doubt = ""
 
     @property
     def session(self) -> zenoh.Session:
@@ -166,7 +168,10 @@ class ZenohBus:
         return [_member(key) for key in tokens(self._session, self._every_ready)]
 
     def conflicts(self) -> list[str]:
-        return self._gate.conflicts()
+        conflicts = self._gate.conflicts()
+        if self._doubted:
+            conflicts.append(f"{self._doubted} answers did not count, the last: {self._last_doubt}")
+        return conflicts
 
     def _watch_incarnations(self) -> None:
         """Learn which are there, before the first message comes."""
@@ -294,11 +299,16 @@ class ZenohBus:
                 continue
             source = "nobody" if other.envelope is None else other.envelope.source
             if self._first_known([other]) is None:
-                log.warning("%s: an answer of %s does not count", request.name, source)
+                self._doubt(f"{request.name}: {source} is not on the bus")
                 continue
             conflict = f"{request.name}: {source} gives unlike answers, somebody else in its name"
-            log.warning("%s", conflict)
+            self._doubt(conflict)
             raise NoAnswerError(conflict)
+
+    def _doubt(self, reason: str) -> None:
+        self._doubted += 1
+        self._last_doubt = reason
+        log.warning("an answer does not count: %s", reason)
 
     def _first_known(self, answers: list[Answer]) -> Answer | None:
         """Return the first answer of an incarnation that is on the bus, None if none is."""

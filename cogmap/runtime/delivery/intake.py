@@ -145,7 +145,9 @@ class Intake:
             if (envelope.source, envelope.seq) != (message.source, message.seq):
                 raise MessageError(f"{topic.name}: envelope and message name different sources")
             if self._plausibility is not None:
-                self._plausibility.check(topic, message, time.monotonic_ns())
+                remark = self._plausibility.check(topic, message, time.monotonic_ns())
+                if remark:
+                    self._log(topic.name, remark)
             if topic.delivery is Delivery.NEVER_DROP:
                 self._follow(topic, envelope, bytes(arrival.payload))
             else:

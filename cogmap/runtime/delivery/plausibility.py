@@ -100,17 +100,20 @@ class Returns:
         self._last = ""
         self._stamps_ns: dict[tuple[Topic, str], int] = {}
 
-    def follow(self, topic: Topic, message: Message) -> None:
-        """Take account of a message."""
+    def follow(self, topic: Topic, message: Message) -> str:
+        """Take account of a message. Returns a sentence if it went back, empty if not."""
         stamp_ns = message.stamp_ns
         key = (topic, message.source)
         behind_ns = self._stamps_ns.pop(key, stamp_ns) - stamp_ns
         self._stamps_ns[key] = stamp_ns
         if len(self._stamps_ns) > MAX_SOURCES:
             del self._stamps_ns[next(iter(self._stamps_ns))]
-        if behind_ns > BACK_NS:
-            self._count += 1
-            self._last = f"{topic.name} of {message.source}, by {behind_ns / 1e9:.0f} s"
+        if behind_ns <= BACK_NS:
+            return ""
+
+        self._count += 1
+        self._last = f"{topic.name} of {message.source}, by {behind_ns / 1e9:.0f} s"
+        return f"{self._last}: it went back in time"
 
     def notes(self) -> list[str]:
         """Return how many went back, and which was the last."""
@@ -133,9 +136,9 @@ class Plausibility:
         self._wall_courses = {kind: Course() for kind in KINDS}
         self._returns = Returns()
 
-    def check(self, topic: Topic, message: Message, now_ns: int) -> None:
-        """Accept `message`, at `now_ns` by a monotonic clock. Raises MessageError if a number of it
-        lies too far from those before.
+    def check(self, topic: Topic, message: Message, now_ns: int) -> str:
+        """Accept `message`, at `now_ns` by a monotonic clock. Returns what is strange about it,
+        empty if nothing is. Raises MessageError if a number of it lies too far from those before.
         """
         stated = []
         courses = self._wall_courses if topic is HEALTH else self._courses
@@ -149,7 +152,7 @@ class Plausibility:
 
         for course, number in stated:
             course.advance(number)
-        self._returns.follow(topic, message)
+        return self._returns.follow(topic, message)
 
     def notes(self) -> list[str]:
         """Return how many messages were refused, and why the last one; and how many went back in
