@@ -291,19 +291,17 @@ class ZenohBus:
         raise NoAnswerError(f"{request.name} was answered by somebody who is not on the bus")
 
     def _check_others(self, request: Topic, answer: Answer, others: list[Answer]) -> None:
-        """Say who else answers. Raises NoAnswerError if somebody in the same name answers something
-        else: nobody can tell which answer is true.
+        """Say who else answers that is not on the bus. Raises NoAnswerError if somebody in the same
+        name answers something else: nobody can tell which answer is true.
         """
         for other in others:
-            if other.payload == answer.payload:
-                continue
             source = "nobody" if other.envelope is None else other.envelope.source
             if self._first_known([other]) is None:
                 self._doubt(f"{request.name}: {source} is not on the bus")
-                continue
-            conflict = f"{request.name}: {source} gives unlike answers, somebody else in its name"
-            self._doubt(conflict)
-            raise NoAnswerError(conflict)
+            elif _voice(other) == _voice(answer) and other.payload != answer.payload:
+                conflict = f"{request.name}: {source} gives unlike answers, somebody in its name"
+                self._doubt(conflict)
+                raise NoAnswerError(conflict)
 
     def _doubt(self, reason: str) -> None:
         self._doubted += 1
@@ -314,8 +312,7 @@ class ZenohBus:
         """Return the first answer of an incarnation that is on the bus, None if none is."""
         present = {(each.source, each.number) for each in self.incarnations()}
         for answer in answers:
-            envelope = answer.envelope
-            if envelope is not None and (envelope.source, envelope.incarnation) in present:
+            if _voice(answer) in present:
                 return answer
         return None
 
@@ -412,6 +409,12 @@ class ZenohBus:
             _, (_, token) = self._claimed.popitem()
             token.undeclare()
         self._session.close()  # type: ignore[no-untyped-call]
+
+
+def _voice(answer: Answer) -> tuple[str, int] | None:
+    """Return as who an answer is given: every module may answer for its settings."""
+    envelope = answer.envelope
+    return None if envelope is None else (envelope.source, envelope.incarnation)
 
 
 def _others(replies: zenoh.handlers.Handler[zenoh.Reply]) -> list[Answer]:

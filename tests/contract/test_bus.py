@@ -362,3 +362,16 @@ def test_whoever_publishes_an_image_waits_while_it_is_on_its_way(over_zenoh: Ove
     publisher.publish(topics.VIEW, bytes(BATCHED_BYTES + 1), ENVELOPE)
 
     assert time.monotonic() - began_s >= TRANSIT_S
+
+
+def test_several_who_are_on_the_bus_may_answer_each_for_itself(over_zenoh: OverZenoh) -> None:
+    asker, *answerers = (over_zenoh.join() for _ in range(3))
+    for number, answerer in enumerate(answerers):
+        own = replace(ENVELOPE, source=f"module-{number}")
+        answerer.claim(Incarnation("module", own.source, own.incarnation))
+        answerer.serve(*SNAPSHOTS, partial(_always, Answer(own.source.encode(), own)), work)
+        meet(asker, answerer)
+
+    answer = asker.query(topics.SNAPSHOT_REQUEST, b"", TIMEOUT_S)
+
+    assert answer.payload in {b"module-0", b"module-1"}

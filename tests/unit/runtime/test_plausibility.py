@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from cogmap.errors import MessageError
 from cogmap.runtime.delivery.plausibility import AGREED_NS, AGREEING, Plausibility
@@ -10,8 +11,9 @@ from cogmap.schemas import topics
 from cogmap.schemas.base import Message
 from cogmap.schemas.cognition import Competition
 from cogmap.schemas.graph import Delta, Phase
-from cogmap.schemas.process import Clock, Health
+from cogmap.schemas.process import Clock
 from cogmap.schemas.sensing import Reset
+from tests.support.health import report
 
 S = 10**9
 FAR = 2**60
@@ -91,23 +93,7 @@ def test_a_message_that_states_no_time_says_nothing_about_it() -> None:
 
 
 def test_health_is_of_the_walls_time() -> None:
-    health = Health(
-        stamp_ns=UNIX_NS,
-        module="motor",
-        instance="motor",
-        ready=True,
-        uptime_s=0.0,
-        received={},
-        emitted={},
-        rejected={},
-        superseded={},
-        gaps={},
-        queued=0,
-        busy=0.0,
-        compute_p50_ms=0.0,
-        compute_p99_ms=0.0,
-        memory_mb=0.0,
-    )
+    health = replace(report("motor"), stamp_ns=UNIX_NS)
     process = Process()
     process.accepts(clock(5))
 
