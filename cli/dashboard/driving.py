@@ -24,7 +24,8 @@ class Driving:
 
     def press(self, key: str) -> str:
         """Go where `key` leads, as one of `cogmap teleop` does. Returns a sentence on what was
-        done. Raises UsageError if another process drives, or for another key.
+        done. Raises UsageError if another process drives, or for another key, and what has ended
+        the driving, until it is left.
         """
         if key in ENDS:
             self.leave()
@@ -39,6 +40,7 @@ class Driving:
                 client = Client(self._steering.module(), self._endpoint, self._agent)
                 client.__enter__()
                 self._client = client
+            self._client.check()
             self._steering.press(key)
         return "you drive"
 

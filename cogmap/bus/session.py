@@ -8,6 +8,7 @@ import ipaddress
 import json
 import re
 import socket
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -48,6 +49,35 @@ QUEUE_BATCHES = 16
 PROTOCOLS = (TCP, TLS) = ("tcp", "tls")
 _QUEUES = ("data_high", "data", "data_low")
 _NAME = re.compile(r"[\w.-]+")
+
+
+class _Closer:
+    """Closes the sessions that are open when the main thread has ended: Python waits for the
+    threads of their callbacks, and a program that fails would never end.
+    """
+
+    def __init__(self) -> None:
+        self._sessions: list[zenoh.Session] = []
+        self._thread: threading.Thread | None = None
+        self._lock = threading.Lock()
+
+    def add(self, session: zenoh.Session) -> None:
+        with self._lock:
+            self._sessions = [each for each in self._sessions if not each.is_closed()]
+            self._sessions.append(session)
+            # A child that was forked has not the thread of its parent.
+            if self._thread is None or not self._thread.is_alive():
+                self._thread = threading.Thread(target=self._close)
+                self._thread.start()
+
+    def _close(self) -> None:
+        threading.main_thread().join()
+        with self._lock:
+            for session in self._sessions:
+                session.close()  # type: ignore[no-untyped-call]
+
+
+_closer = _Closer()
 
 
 def check_name(option: str, name: str) -> None:
@@ -132,13 +162,16 @@ def open_client(
         settings["transport/link/tls"] = keys.to_connect()
 
     try:
-        return zenoh.open(_config("client", **settings))
+        session = zenoh.open(_config("client", **settings))
     except zenoh.ZError:
         if keys is None and handshake.speaks_tls(_address(endpoint)):
             raise AccessError(
                 f"the router at {endpoint} asks for keys: name their folder with --keys"
             ) from None
         raise missing from None
+
+    _closer.add(session)
+    return session
 
 
 def _await_listener(endpoint: str, timeout_s: float, is_asked_to_end: Callable[[], bool]) -> float:

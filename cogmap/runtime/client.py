@@ -69,6 +69,10 @@ class Client:
         self._ended.set()
         if self._thread is not None:
             self._thread.join()
+        self.check()
+
+    def check(self) -> None:
+        """Raise what has ended the module, if something has."""
         if self._error is not None:
             raise self._error
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import subprocess
+import sys
 import threading
 import time
 from functools import partial
@@ -345,6 +347,23 @@ def test_an_agent_that_cannot_be_in_a_key_names_itself(endpoint: str, name: str)
 
     with pytest.raises(UsageError, match=f"--agent {quoted}: use letters, digits"):
         ZenohBus(endpoint, name)
+
+
+def test_a_program_that_fails_with_an_open_bus_ends(over_zenoh: OverZenoh) -> None:
+    program = (
+        "import sys\n"
+        "from cogmap.bus.zenoh_bus import ZenohBus\n"
+        "from cogmap.schemas import topics\n"
+        "bus = ZenohBus(*sys.argv[1:])\n"
+        "bus.subscribe(topics.CLOCK, print, print)\n"
+        "raise RuntimeError('it fails')\n"
+    )
+    command = [sys.executable, "-c", program, over_zenoh.endpoint, over_zenoh.agent]
+
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False)
+
+    assert ended.returncode == 1
+    assert ended.stderr.endswith("RuntimeError: it fails\n")
 
 
 def test_an_instance_that_cannot_be_in_a_key_names_itself(over_zenoh: OverZenoh) -> None:

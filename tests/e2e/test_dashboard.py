@@ -7,6 +7,7 @@ import shutil
 import signal
 import subprocess
 from collections.abc import Callable, Iterator
+from contextlib import closing
 from pathlib import Path
 from urllib.parse import urlsplit
 from urllib.request import urlopen
@@ -120,10 +121,9 @@ def test_every_panel_shows_the_running_system_and_a_click_is_a_goal(
         assert isinstance(message, Offer)
         offered.extend(each for each in message.operations if isinstance(each, Goal))
 
-    bus = ZenohBus(run.endpoint, "agent")
-    bus.subscribe(topics.OFFER, receive, lambda _topic, _number: None)
     served = serve("--connect", run.endpoint)
-    with browser() as page:
+    with closing(ZenohBus(run.endpoint, "agent")) as bus, browser() as page:
+        bus.subscribe(topics.OFFER, receive, lambda _topic, _number: None)
         page.get(served.address)
         for name, shows in PANELS.items():
             await_script(page, f"return {shows}", f"the panel {name} shows something")
@@ -139,7 +139,6 @@ def test_every_panel_shows_the_running_system_and_a_click_is_a_goal(
         assert faults(page) == []
         assert errors(page) == []
         assert foreign_requests(page, urlsplit(served.address).netloc) == []
-    bus.close()
     run.close()
 
 
@@ -155,23 +154,22 @@ def test_keys_drive_a_robot_that_nothing_else_drives(
         assert isinstance(message, MotorCommand)
         commands.append(message)
 
-    bus = ZenohBus(run.endpoint, "agent")
-    bus.subscribe(topics.MOTOR_COMMAND, receive, lambda _topic, _number: None)
     served = serve("--connect", run.endpoint)
-    with browser() as page:
+    with closing(ZenohBus(run.endpoint, "agent")) as bus, browser() as page:
+        bus.subscribe(topics.MOTOR_COMMAND, receive, lambda _topic, _number: None)
         page.get(served.address)
         await_script(page, IS_THERE, "the system is there")
         page.find_element(By.ID, "drive").click()
         await_script(page, f"return {ANSWER} === 'you drive'", "the robot obeys")
 
         def is_ahead() -> bool:
+            assert page.execute_script(f"return {ANSWER}") == "you drive"
             page.find_element(By.TAG_NAME, "body").send_keys(Keys.ARROW_UP)
             return any(each.left_wheel_rad_s > 0.0 for each in commands)
 
         wait_until(is_ahead, "it drives ahead")
         page.find_element(By.ID, "drive").click()
         await_script(page, f"return {ANSWER} === 'the robot is left alone'", "it is left")
-    bus.close()
     run.close()
 
 
