@@ -30,6 +30,9 @@ LAPS = "40"
 """More than a campaign takes."""
 
 MOVING = 10
+BEGUN_NS = 10_000_000_000
+"""The time of a drive by which a stamp of its beginning is one of the past."""
+
 RECENT_S = 2.0
 Sentences = list[str]
 
@@ -73,13 +76,15 @@ class Driving:
         return bus
 
     def await_motion(self, timeout_s: float) -> bool:
-        """Wait until wheels turn. Returns whether they do."""
+        """Wait until the drive has begun and wheels turn. Returns whether they do."""
         began_s = time.monotonic()
         while time.monotonic() < began_s + timeout_s and not self.system.has_ended:
             self.listener.pump(0.2)
             moves = [each for each in self.listener.commands if each.moves]
+            places = self.listener.places
             is_enough = len(moves) >= MOVING
-            if is_enough and moves[-1].time_s > time.monotonic() - RECENT_S:
+            has_begun = places[-1:] and places[-1].pose.stamp_ns >= BEGUN_NS
+            if has_begun and is_enough and moves[-1].time_s > time.monotonic() - RECENT_S:
                 return True
         return False
 

@@ -42,7 +42,8 @@ def lie(kind: Kind, true: Message, number: int, told: int) -> Message:
         case Kind.FAR_STAMP:
             changes["stamp_ns"] = FAR_NS
         case Kind.OLD_STAMP:
-            changes["stamp_ns"] = max(0, true.stamp_ns - OLD_NS)
+            # A stamp of 0 states nothing.
+            changes["stamp_ns"] = max(1, true.stamp_ns - OLD_NS)
         case Kind.NEGATIVE_STAMP:
             changes["stamp_ns"] = -OLD_NS
         case Kind.FAR_CYCLE | Kind.FAR_VERSION:

@@ -101,16 +101,34 @@ def test_health_is_of_the_walls_time() -> None:
     assert process.accepts(clock(6))
 
 
-def test_what_lies_far_behind_the_message_before_is_accepted_and_named() -> None:
+@pytest.mark.parametrize(("stamp_s", "distance"), [(41, "60 s behind"), (161, "60 s ahead of")])
+def test_what_lies_far_from_the_messages_before_is_accepted_and_named(
+    stamp_s: int, distance: str
+) -> None:
     process = Process()
-    for stamp_s in (100, 96, 101):
-        assert process.accepts(clock(stamp_s))
+    for before_s in (100, 96, 101):
+        assert process.accepts(clock(before_s))
     assert process.plausibility.notes() == []
 
-    assert process.accepts(clock(41))
+    assert process.accepts(replace(competition(7), stamp_ns=stamp_s * S, source="stranger"))
+    assert process.accepts(clock(101))
 
     (note,) = process.plausibility.notes()
-    assert note == "1 messages went back in time, the last: clock of sim, by 60 s"
+    what = f"global_workspace/competition of stranger: its stamp lies {distance} all before it"
+    assert note == f"1 messages jumped in time, the last: {what}"
+
+
+def test_a_simulation_that_begins_anew_is_named_for_a_second() -> None:
+    process = Process()
+    process.accepts(clock(100))
+
+    for number in range(100):
+        assert process.accepts(clock(1 + number / 10))
+
+    (note,) = process.plausibility.notes()
+    named = int(note.split()[0])
+    assert named + 1 >= AGREEING
+    assert (named - 1) * 0.1 * S <= AGREED_NS
 
 
 def test_of_a_refused_message_no_number_counts() -> None:
