@@ -14,11 +14,10 @@ import zenoh
 from zenoh import ext
 
 from cogmap.bus.access.subjects import SUBJECTS
-from cogmap.bus.codec import Envelope, decode_envelope, encode
+from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.depth import cached_messages
 from cogmap.bus.discovery import Role, announce_use, identify, tokens
 from cogmap.bus.incarnations import (
-    HOLD_S,
     UNNAMED,
     Gate,
     every_incarnation,
@@ -26,8 +25,10 @@ from cogmap.bus.incarnations import (
     read_incarnation,
 )
 from cogmap.bus.interface import Answer, Arrival, Incarnation, Job, Member, Past
+from cogmap.bus.questions import Questions
+from cogmap.bus.samples import encoding, envelope_of
 from cogmap.bus.session import check_name, is_name, open_client, past_key, ready_key
-from cogmap.errors import MessageError, NoAnswerError
+from cogmap.errors import NoAnswerError
 from cogmap.schemas.topics import Delivery, Scope, Topic
 
 if TYPE_CHECKING:
@@ -38,10 +39,6 @@ log = logging.getLogger("cogmap")
 # computes.
 SWITCH_S = 5e-5
 RECOVERY_PERIOD = timedelta(seconds=0.5)
-# Answers are sent with the priority of their query. One of its own: where an answer fills its queue
-# and one of the periodic queries above, which have the default, comes in between, Zenoh 1.10 sends
-# neither and closes the link after 5 s.
-ANSWER_PRIORITY = zenoh.Priority.BACKGROUND
 # Zenoh answers from a cache on the thread that receives, with the cache locked: if it waited there
 # for a slow link, so would all that is published and received. The outbox has what is dropped.
 CACHE_REPLIES = ext.RepliesConfig(congestion_control=zenoh.CongestionControl.DROP)
@@ -53,10 +50,6 @@ _LARGE_BYTES = 8 * 2**20
 # takes twice as long while the thread that has published it computes on.
 BATCHED_BYTES = 2**17
 TRANSIT_S = 0.002
-POLL_S = 0.05
-# After an answer, whoever else answers is heard for so long: the router says when all have.
-OTHERS_S = 0.1
-OTHERS_POLL_S = 0.001
 
 
 class _Closable(Protocol):
@@ -93,8 +86,7 @@ class ZenohBus:
         self._claimed: dict[str, tuple[int, _Closable]] = {}
         self._gate = Gate()
         self._watches_incarnations = False
-        self._doubted = 0
-        self._last_doubt = ""
+        self._questions = Questions(self._session, agent, self.incarnations)
 
     @property
     def session(self) -> zenoh.Session:
@@ -168,10 +160,7 @@ class ZenohBus:
         return [_member(key) for key in tokens(self._session, self._every_ready)]
 
     def conflicts(self) -> list[str]:
-        conflicts = self._gate.conflicts()
-        if self._doubted:
-            conflicts.append(f"{self._doubted} answers did not count, the last: {self._last_doubt}")
-        return conflicts
+        return [*self._gate.conflicts(), *self._questions.notes()]
 
     def _watch_incarnations(self) -> None:
         """Learn which are there, before the first message comes."""
@@ -199,7 +188,7 @@ class ZenohBus:
     ) -> None:
         def receive(sample: zenoh.Sample) -> None:
             now_ns = time.time_ns()
-            arrival = Arrival(topic, bytes(sample.payload), _envelope(sample), now_ns)
+            arrival = Arrival(topic, bytes(sample.payload), envelope_of(sample), now_ns)
             self._gate.put(arrival, deliver)
 
         if self._subject is not None:
@@ -253,68 +242,7 @@ class ZenohBus:
     def query(self, request: Topic, payload: bytes, timeout_s: float) -> Answer:
         if self._subject is not None:
             self._subject.check_asks(request)
-        replies = self._session.get(
-            request.key(self._agent),
-            payload=payload,
-            encoding=encoding(request),
-            priority=ANSWER_PRIORITY,
-            consolidation=zenoh.ConsolidationMode.NONE,
-            timeout=timeout_s,
-        )
-        reason = (
-            f"nobody answers {request.name} within {timeout_s:g} s: "
-            f"is the module that does running?"
-        )
-        unknown = []
-        for reply in replies:
-            if reply.ok is not None:
-                answer = Answer(bytes(reply.ok.payload), _envelope(reply.ok))
-                if self._first_known([answer]) is None:
-                    unknown.append(answer)
-                    continue
-                self._check_others(request, answer, [*unknown, *_others(replies)])
-                return answer
-            if reply.err is not None:
-                said = bytes(reply.err.payload).decode(errors="replace")
-                reason = f"{request.name}: {said}"
-        if not unknown:
-            raise NoAnswerError(reason)
-
-        # While the tokens that this session watches are on their way, none may be listed.
-        until_s = time.monotonic() + HOLD_S
-        while time.monotonic() < until_s:
-            known = self._first_known(unknown)
-            if known is not None:
-                self._check_others(request, known, unknown)
-                return known
-            time.sleep(POLL_S)
-        raise NoAnswerError(f"{request.name} was answered by somebody who is not on the bus")
-
-    def _check_others(self, request: Topic, answer: Answer, others: list[Answer]) -> None:
-        """Say who else answers that is not on the bus. Raises NoAnswerError if somebody in the same
-        name answers something else: nobody can tell which answer is true.
-        """
-        for other in others:
-            source = "nobody" if other.envelope is None else other.envelope.source
-            if self._first_known([other]) is None:
-                self._doubt(f"{request.name}: {source} is not on the bus")
-            elif _voice(other) == _voice(answer) and other.payload != answer.payload:
-                conflict = f"{request.name}: {source} gives unlike answers, somebody in its name"
-                self._doubt(conflict)
-                raise NoAnswerError(conflict)
-
-    def _doubt(self, reason: str) -> None:
-        self._doubted += 1
-        self._last_doubt = reason
-        log.warning("an answer does not count: %s", reason)
-
-    def _first_known(self, answers: list[Answer]) -> Answer | None:
-        """Return the first answer of an incarnation that is on the bus, None if none is."""
-        present = {(each.source, each.number) for each in self.incarnations()}
-        for answer in answers:
-            if _voice(answer) in present:
-                return answer
-        return None
+        return self._questions.ask(request, payload, timeout_s)
 
     def serve_past(self, topic: Topic, source: str, past: Past) -> None:
         def respond(query: zenoh.Query) -> None:
@@ -358,7 +286,7 @@ class ZenohBus:
             if reply.ok is not None:
                 now_ns = time.time_ns()
                 payload = bytes(reply.ok.payload)
-                found.append(Arrival(topic, payload, _envelope(reply.ok), now_ns))
+                found.append(Arrival(topic, payload, envelope_of(reply.ok), now_ns))
             elif reply.err is not None:
                 reason = bytes(reply.err.payload)
         if found or reason == NONE_KEPT:
@@ -411,35 +339,6 @@ class ZenohBus:
         self._session.close()  # type: ignore[no-untyped-call]
 
 
-def _voice(answer: Answer) -> tuple[str, int] | None:
-    """Return as who an answer is given: every module may answer for its settings."""
-    envelope = answer.envelope
-    return None if envelope is None else (envelope.source, envelope.incarnation)
-
-
-def _others(replies: zenoh.handlers.Handler[zenoh.Reply]) -> list[Answer]:
-    """Return what else is answered soon."""
-    found = []
-    until_s = time.monotonic() + OTHERS_S
-    while time.monotonic() < until_s:
-        try:
-            reply = replies.try_recv()
-        except zenoh.ZError:
-            break  # all have answered
-        if reply is None:
-            time.sleep(OTHERS_POLL_S)
-        elif reply.ok is not None:
-            found.append(Answer(bytes(reply.ok.payload), _envelope(reply.ok)))
-    return found
-
-
-def encoding(topic: Topic) -> zenoh.Encoding:
-    """Return what a sample of `topic` holds, for storages and viewers:
-    `application/msgpack;Odometry`.
-    """
-    return zenoh.Encoding(f"application/msgpack;{topic.type.__name__}")
-
-
 def _member(key: str) -> Member:
     """Return the member that the key of a token names."""
     *_, module, instance = key.split("/")
@@ -454,13 +353,3 @@ def _priority(topic: Topic) -> zenoh.Priority:
     if topic.scope is Scope.TRUTH or (can_be_replaced and (is_large or is_health)):
         return zenoh.Priority.DATA_LOW
     return zenoh.Priority.DATA_HIGH
-
-
-def _envelope(sample: zenoh.Sample) -> Envelope | None:
-    """Decode the envelope in a sample's attachment; None if there is none that can be decoded."""
-    if sample.attachment is None:
-        return None
-    try:
-        return decode_envelope(bytes(sample.attachment))
-    except MessageError:
-        return None
