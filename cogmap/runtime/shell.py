@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from typing import Any
 
 from cogmap.bus.codec import Cause, decode, encode
 from cogmap.bus.depth import cached_messages
-from cogmap.bus.interface import Answer, Arrival, Bus, Member
+from cogmap.bus.interface import Answer, Arrival, Bus, Job, Member
 from cogmap.errors import MessageError
 from cogmap.graph.replica import Fetched
 from cogmap.runtime.delivery.flood import Flood
@@ -125,7 +126,7 @@ class Shell:
             self.bus.subscribe(topics.HEALTH, put, _leave_to_numbers)
         for request, (reply, handler) in self.module.served.items():
             answer = self._server(request, handler)
-            self.bus.serve(request, reply, answer, self.inbox.call)
+            self.bus.serve(request, reply, answer, partial(self._enqueue, request))
 
         if self._store is not None:
             self.publisher.send_restored(self._store)
@@ -307,6 +308,16 @@ class Shell:
             self._invoke(call, cause)
 
         return due
+
+    def _enqueue(self, request: topics.Topic, job: Job) -> None:
+        """Have the module's own thread answer a request."""
+
+        def answer() -> None:
+            began_s = time.monotonic()
+            job()
+            self.flood.answered(request, time.monotonic() - began_s)
+
+        self.inbox.call(answer)
 
     def _server(
         self, request: topics.Topic, handler: Callable[[Any], Message]

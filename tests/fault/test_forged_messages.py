@@ -14,12 +14,17 @@ from benchmarks.forge.measure import Campaign
 from cogmap.schemas import topics
 
 SEED = 1
-LIMIT_S = 100.0
+LIMIT_S = 180.0
 CASES = [
     Case(topics.PERCEPTS.name, Kind.NEGATIVE_STAMP, Mode.LOCKSTEP),
     Case(topics.STEREO.name, Kind.OTHER_SOURCE, Mode.LOCKSTEP),
     Case(topics.SELF_MOTION.name, Kind.NEGATIVE_STAMP, Mode.LOCKSTEP),
     Case(topics.MOTOR_COMMAND.name, Kind.NEGATIVE_STAMP, Mode.LOCKSTEP),
+    Case(topics.SELF_MOTION.name, Kind.FAR_NUMBER, Mode.LOCKSTEP),
+    Case(topics.SELF_MOTION.name, Kind.NEW_INCARNATION, Mode.LOCKSTEP),
+    Case(topics.SELF_MOTION.name, Kind.FLOOD, Mode.LOCKSTEP),
+    Case(topics.LEARNED.name, Kind.OLD_STAMP, Mode.LOCKSTEP),
+    Case(topics.DELTA.name, Kind.FAR_VERSION, Mode.LOCKSTEP),
 ]
 
 

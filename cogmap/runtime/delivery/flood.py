@@ -28,6 +28,8 @@ REFUSED_HZ = 20.0
 ASKED_BURST = 100.0
 ASKED_HZ = 50.0
 """So many requests are answered, whoever asks: more than all modules make that start together."""
+ASKED_S = 0.01
+"""An answer that takes longer counts as several: so a flood has at most half of a module's time."""
 MAX_SENDERS = 4096
 MAX_NOTES = 4
 LOG_PERIOD_S = 10.0
@@ -74,6 +76,29 @@ class _Sender:
         return note(f"{shed} of {self.source} were shed, as a flood", f"end {self.source}")
 
 
+@dataclass(slots=True)
+class _Asked:
+    """How many requests can be answered yet, as of `at_s`; fewer than none after a long answer."""
+
+    left: float
+    at_s: float
+
+    def admits(self, now_s: float) -> bool:
+        """Take account of a request. Returns whether it is answered."""
+        passed_s = now_s - self.at_s
+        self.at_s = now_s
+        self.left = min(ASKED_BURST, self.left + passed_s * ASKED_HZ)
+        if self.left < 1:
+            return False
+        self.left -= 1
+        return True
+
+    def pay(self, took_s: float) -> None:
+        """Count an answer that took long as several."""
+        others = max(0.0, took_s / ASKED_S - 1)
+        self.left = max(self.left - others, -ASKED_BURST)
+
+
 class Flood:
     """Decides which arrivals come in: all but those of a flood. Any thread may call it.
 
@@ -86,7 +111,7 @@ class Flood:
         self._clock = clock
         self.shed: Counter[str] = Counter()
         self._senders: dict[_Key, _Sender] = {}
-        self._asked: dict[Topic, _Sender] = {}
+        self._asked: dict[Topic, _Asked] = {}
         self._lock = threading.Lock()
 
     def before(self, deliver: Callable[[Arrival], None]) -> Callable[[Arrival], None]:
@@ -118,18 +143,18 @@ class Flood:
         return False
 
     def admits_request(self, request: Topic) -> bool:
-        """Take account of a request: nobody knows whose. Returns whether it is answered. While too
-        many ask, some are answered all the same.
-        """
+        """Take account of a request: nobody knows whose. Returns whether it is answered."""
         now_s = self._clock()
         with self._lock:
+            asked = self._asked.setdefault(request, _Asked(ASKED_BURST, now_s))
+            return asked.admits(now_s)
+
+    def answered(self, request: Topic, took_s: float) -> None:
+        """Take account of the time that a request took, with the sending of its answer."""
+        with self._lock:
             asked = self._asked.get(request)
-            if asked is None:
-                asked = _Sender(request, "", True, ASKED_BURST, ASKED_HZ, ASKED_BURST, now_s)
-                self._asked[request] = asked
-            is_answered = asked.admits(now_s)
-            asked.left = max(0.0, asked.left)
-        return is_answered
+            if asked is not None:
+                asked.pay(took_s)
 
     def skipped(self, arrival: Arrival) -> Envelope | None:
         """Return the last message that was shed before `arrival`, of its source and topic, once:

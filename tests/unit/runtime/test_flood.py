@@ -14,6 +14,7 @@ from cogmap.bus.memory import MemoryBus, MemoryNetwork
 from cogmap.runtime.delivery.flood import (
     ASKED_BURST,
     ASKED_HZ,
+    ASKED_S,
     CALM_S,
     FASTEST,
     REFUSED_BURST,
@@ -113,6 +114,22 @@ def test_of_many_requests_as_many_are_answered_as_all_modules_make_and_some_of_t
     door.now_s += 2.5 / ASKED_HZ
     later = [door.flood.admits_request(topics.SNAPSHOT_REQUEST) for _ in range(3)]
     assert later == [True, True, False]
+
+
+def test_requests_whose_answers_take_long_have_half_of_a_modules_time() -> None:
+    door = Door()
+    answer_s = 0.2
+    answering_s = 0.0
+    for _ in range(1000):
+        if door.flood.admits_request(topics.SNAPSHOT_REQUEST):
+            door.now_s += answer_s
+            answering_s += answer_s
+            door.flood.answered(topics.SNAPSHOT_REQUEST, answer_s)
+        door.now_s += 0.01
+
+    at_once_s = ASKED_BURST * ASKED_S
+    assert answering_s <= at_once_s + answer_s + door.now_s * ASKED_HZ * ASKED_S
+    assert answering_s >= door.now_s * ASKED_HZ * ASKED_S - answer_s
 
 
 class Flooded:
