@@ -15,10 +15,6 @@ from cogmap.errors import NoAnswerError
 from cogmap.schemas.topics import Topic
 
 log = logging.getLogger("cogmap")
-# Answers are sent with the priority of their query. One of its own: where an answer fills its queue
-# and a periodic query of a subscriber, which has the default, comes in between, Zenoh 1.10 sends
-# neither and closes the link after 5 s.
-ANSWER_PRIORITY = zenoh.Priority.BACKGROUND
 POLL_S = 0.05
 # After an answer, whoever else answers is heard for so long: the router says when all have.
 OTHERS_S = 0.1
@@ -53,7 +49,6 @@ class Questions:
             request.key(self._agent),
             payload=payload,
             encoding=encoding(request),
-            priority=ANSWER_PRIORITY,
             consolidation=zenoh.ConsolidationMode.NONE,
             timeout=timeout_s,
         )

@@ -20,11 +20,12 @@ from cogmap.bus.access import handshake
 from cogmap.bus.access.others import everybody
 from cogmap.bus.access.rules import access_control
 from cogmap.errors import AccessError, NoRouterError, PortInUseError, UsageError
+from cogmap.schemas import topics
+from cogmap.schemas.topics import Delivery, Topic
 
 if TYPE_CHECKING:
     from cogmap.bus.access.keys import Keys
     from cogmap.bus.interface import Member
-    from cogmap.schemas.topics import Topic
 
 DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 DEFAULT_AGENT = "agent"
@@ -46,6 +47,10 @@ WAIT_BEFORE_DROP_US = 100_000
 # A stereo frame takes seven batches: with room for two only, a busy machine would drop it before it
 # is sent.
 QUEUE_BATCHES = 16
+# Answers have the priority of their query: one of their own, whatever the asker chose. Where an
+# answer fills its queue and a periodic query of a subscriber, which has the default, comes in
+# between, Zenoh 1.10 sends neither and closes the link after 5 s.
+ANSWER_PRIORITY = "background"
 PROTOCOLS = (TCP, TLS) = ("tcp", "tls")
 _QUEUES = ("data_high", "data", "data_low")
 _NAME = re.compile(r"[\w.-]+")
@@ -238,6 +243,7 @@ def check_free(endpoint: str) -> None:
 
 def _config(mode: str, **settings: object) -> zenoh.Config:
     config = zenoh.Config()
+    requests = [topic for topic in topics.ALL if topic.delivery is Delivery.ON_REQUEST]
     settings |= {
         "mode": mode,
         "scouting/multicast/enabled": False,
@@ -248,6 +254,15 @@ def _config(mode: str, **settings: object) -> zenoh.Config:
             "wait_before_drop": WAIT_BEFORE_DROP_US,
             "max_wait_before_drop_fragments": WAIT_BEFORE_DROP_US,
         },
+        "qos/network": [
+            {
+                "id": "answers",
+                "key_exprs": [topic.key("*") for topic in requests],
+                "messages": ["query"],
+                "flows": ["ingress", "egress"],
+                "overwrite": {"priority": ANSWER_PRIORITY},
+            }
+        ],
     }
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
