@@ -17,6 +17,10 @@ from cogmap.services.epam.config import Priming
 
 BEHIND = 2
 """A view is primed by what was conscious up to so many views before it."""
+MAX_WAITING = 64
+"""So many broadcasts wait for a view, of 13 s at five a second: where a simulation publishes the
+percepts itself, there is none.
+"""
 BROADCASTS_PER_PUBLICATION = 16
 """The graph is published, and so kept, after so many broadcasts: a crash forgets at most those."""
 
@@ -51,6 +55,7 @@ class Primer:
         self._waiting = [each for each in self._waiting if each.stamp_ns <= now_ns]
         if now_ns > self._graph.updated_ns:
             self._waiting.append(broadcast)
+            del self._waiting[:-MAX_WAITING]
 
     @property
     def is_ready(self) -> bool:

@@ -12,7 +12,7 @@ from cogmap.schemas.feelings import Feeling
 from cogmap.schemas.nodes import Object, category_id, name_id
 from cogmap.schemas.sensing import Associations
 from cogmap.services.epam.association.graph import MAX_NODES, AssociativeGraph
-from cogmap.services.epam.association.memory import Primer, nodes_of
+from cogmap.services.epam.association.memory import MAX_WAITING, Primer, nodes_of
 from cogmap.services.epam.association.prior import Prior
 from cogmap.services.epam.config import Priming
 from cogmap.testing import landmark
@@ -129,6 +129,20 @@ def test_a_view_is_not_primed_by_what_came_after_the_view_before_the_last() -> N
     assert primer.begin(6 * SECOND_NS) == early.begin(6 * SECOND_NS)
     assert primer.prior(6 * SECOND_NS) == early.prior(6 * SECOND_NS)
     assert primer.prior(6 * SECOND_NS).primed
+
+
+def test_without_views_no_more_than_the_newest_broadcasts_are_kept() -> None:
+    primer = Primer(CONFIG)
+    count = 1000
+    for second in range(count):
+        primer.on_broadcast(_broadcast(second, _object(f"building-{second}")))
+
+    for second in range(count, count + 3):
+        primer.begin(second * SECOND_NS)
+
+    learned = set(primer.published().names)
+    newest = range(count - MAX_WAITING, count)
+    assert learned == {name_id(f"building-{second}") for second in newest}
 
 
 def test_a_view_is_ready_once_the_competition_that_primes_it_has_ended() -> None:
