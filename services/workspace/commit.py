@@ -19,12 +19,17 @@ from cogmap.services.workspace.rules import Key, Writer, check_operation, writte
 # Stated in a delta, so that a worker that fails all the time does not make deltas large.
 MAX_REASONS = 8
 MAX_REASON_CHARACTERS = 200
+REMEMBERED_VERSIONS = 4096
+"""It is known what was written when of so many versions, three minutes of a usual drive: an answer
+on an older one is late, whatever it writes.
+"""
 
 
 class Ledger:
     """The graph, and the version that last wrote each node and each column of a tile.
 
-    What a snapshot holds counts as written at its version.
+    What a snapshot holds counts as written at its version, and what is not known any more as
+    written at the last that is not.
     """
 
     def __init__(self, writers: Mapping[str, Writer]) -> None:
@@ -161,6 +166,12 @@ class Ledger:
 
             for key in written_by(operation):
                 written[key] = version
+
+        if version - self._written_before >= 2 * REMEMBERED_VERSIONS:
+            self._written_before = version - REMEMBERED_VERSIONS
+            self._written = {
+                key: known for key, known in written.items() if known > self._written_before
+            }
 
 
 def coalitions_of(context: CycleContext, proposals: list[Proposal]) -> Coalitions:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import msgspec
 import numpy as np
 import pytest
@@ -23,7 +25,7 @@ from cogmap.schemas.graph import (
     PlaceTile,
 )
 from cogmap.schemas.nodes import ROOT_MAP, TILE_SIDE, LinkKind, Map, Node, PlaceColumn, object_id
-from cogmap.services.workspace.commit import Ledger
+from cogmap.services.workspace.commit import REMEMBERED_VERSIONS, Ledger
 from cogmap.testing import agent, landmark, percept, task
 from tests.support.world.scenes import Desk, answer, thing
 
@@ -208,6 +210,31 @@ def test_a_proposal_is_late_only_for_nodes_changed_since_its_version() -> None:
         ledger.check(_proposal(thing("b"), base_version=2))
     with pytest.raises(MessageError, match="late: b has changed"):
         ledger.check(_proposal(DropNode(id="b"), base_version=2))
+
+
+def test_what_was_written_long_ago_is_known_no_more_and_answers_on_it_are_late() -> None:
+    ledger = _ledger()
+    for number in range(2 * REMEMBERED_VERSIONS):
+        ledger.commit(0, 1, Phase.OBJECTS, [thing(f"seen-{number}")])
+    version = ledger.graph.version
+
+    ledger.check(_proposal(thing("a"), base_version=version - REMEMBERED_VERSIONS))
+    with pytest.raises(MessageError, match="is late"):
+        ledger.check(_proposal(thing("a"), base_version=version - 2 * REMEMBERED_VERSIONS))
+
+
+def test_the_memory_of_what_was_written_does_not_grow_with_time() -> None:
+    ledger = _ledger()
+    kept_bytes = []
+    tracemalloc.start()
+    for number in range(6 * REMEMBERED_VERSIONS):
+        node = thing(f"seen-{number}")
+        ledger.commit(0, 1, Phase.OBJECTS, [node, DropNode(id=node.id)])
+        if number % (2 * REMEMBERED_VERSIONS) == REMEMBERED_VERSIONS:
+            kept_bytes.append(tracemalloc.get_traced_memory()[0])
+    tracemalloc.stop()
+
+    assert kept_bytes[-1] < 1.2 * kept_bytes[0]
 
 
 def test_links_are_never_late() -> None:
