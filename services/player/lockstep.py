@@ -79,6 +79,6 @@ class Lockstep:
 
         self._view_ns = step.stamp_ns
         self._is_answered = False
-        self._sensed = [*step.before, *step.view]
         clock = Clock(stamp_ns=step.stamp_ns, rate=0.0)
+        self._sensed = [*step.before, clock, *step.view]
         return [*step.before, clock, *step.truth, *step.view]

@@ -53,7 +53,7 @@ class Lockstep:
         self._repetition.on_presence(presence)
 
     def on_timer(self, wall_ns: int) -> list[Message]:
-        """Return the last frame and its odometry once more if no command has answered it for
+        """Return the last frame, its odometry and clock once more if no command has answered it for
         longer than cycles take: a module that was killed may have lost it.
         """
         if self._frame_ns is None or self._simulation.progress >= 1.0:
@@ -83,6 +83,7 @@ class Lockstep:
 
         self._frame_ns = simulation.now_ns
         self._is_answered = False
-        self._senses = [*odometry, *view]
+        # The clock, too: whoever drives in motor's place may answer that.
+        self._senses = [*odometry, clock, *view]
 
         return [*odometry, clock, truth, *town, *view]

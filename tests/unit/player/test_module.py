@@ -92,6 +92,7 @@ def test_lockstep_repeats_a_view_that_nobody_answers_but_no_truth() -> None:
         repeated += lockstep.on_timer(START_NS + tick * CHECK_NS)
 
     assert repeated == [message for message in first if message in repeated]
+    assert len(of_type(Clock, repeated)) == 1
     assert of_type(Playback, repeated) == []
     assert repeated[-1].stamp_ns == stamp_ns(0)
 

@@ -6,7 +6,7 @@ from cogmap.runtime.module import Module
 from cogmap.runtime.repetition import CHECK_NS, DOUBTED_AFTER_NS, REPEAT_AFTER_NS
 from cogmap.runtime.run import LOCKSTEP
 from cogmap.schemas.base import Message
-from cogmap.schemas.process import Presence
+from cogmap.schemas.process import Clock, Presence
 from cogmap.schemas.sensing import MotorCommand, Percepts, RangeScan, SelfMotion, TruePose
 from cogmap.services.sim.module import Config, build
 from cogmap.testing import of_type
@@ -49,7 +49,12 @@ def test_a_frame_is_repeated_as_it_was_soon_after_a_module_came_back() -> None:
 
     repeated = simulator.wait(DOUBTED_AFTER_NS + CHECK_NS)
 
-    assert [type(message) for message in repeated] == [SelfMotion, RangeScan, Percepts]
+    assert [type(message) for message in repeated] == [
+        Clock,
+        SelfMotion,
+        RangeScan,
+        Percepts,
+    ]
     for message in repeated:
         (before,) = of_type(type(message), simulator.first)
         assert message.stamp_ns == before.stamp_ns
