@@ -70,7 +70,7 @@ class _Closer:
         with self._lock:
             self._sessions = [each for each in self._sessions if not each.is_closed()]
             self._sessions.append(session)
-            # A child that was forked has not the thread of its parent.
+            # A child that was forked does not have the thread of its parent.
             if self._thread is None or not self._thread.is_alive():
                 self._thread = threading.Thread(target=self._close)
                 self._thread.start()
