@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from cogmap.bus.codec import Envelope
 from cogmap.bus.depth import KEPT_S, flow_of
 from cogmap.bus.interface import Arrival
+from cogmap.runtime.delivery.budget import Budget
 from cogmap.runtime.notes import note
 from cogmap.schemas.topics import Topic
 
@@ -39,33 +40,28 @@ _Key = tuple[Topic, str | None]
 
 @dataclass(slots=True)
 class _Sender:
-    """A source of a topic, or all of whom messages are refused: `burst` messages may come at once,
-    and `rate_hz` on average.
+    """A source of a topic, or all of whom messages are refused, and what may come of it.
 
-    What comes beyond counts too: `left` falls below zero, and while a flood lasts none comes in.
     `shed` were left out, of them `last` the last, and that was logged at `logged_s`.
     """
 
     topic: Topic
     source: str
     is_refused: bool
-    burst: float
-    rate_hz: float
-    left: float
-    at_s: float
+    budget: Budget
     shed: int = 0
     last: Envelope | None = None
     logged_s: float = -math.inf
 
     def admits(self, now_s: float) -> bool:
-        """Take account of a message. Returns whether it comes in."""
-        passed_s = now_s - self.at_s
-        self.at_s = now_s
-        self.left = min(self.burst, self.left + passed_s * self.rate_hz) - 1
-        if self.left >= 0:
-            return True
-        self.left = max(self.left, -CALM_S * self.rate_hz)
-        return False
+        """Take account of a message. Returns whether it comes in.
+
+        What does not come in counts too: while a flood lasts, none of it does.
+        """
+        budget = self.budget
+        budget.refill(now_s)
+        budget.spend(1, most_owed=CALM_S * budget.rate_hz)
+        return budget.left >= 0
 
     def note(self) -> str:
         """Say how much of it was shed."""
@@ -74,29 +70,6 @@ class _Sender:
             wrong = f"{shed} were shed that would be refused anyway"
             return note(wrong, "see in the log who sends them")
         return note(f"{shed} of {self.source} were shed, as a flood", f"end {self.source}")
-
-
-@dataclass(slots=True)
-class _Asked:
-    """How many requests can be answered yet, as of `at_s`; fewer than none after a long answer."""
-
-    left: float
-    at_s: float
-
-    def admits(self, now_s: float) -> bool:
-        """Take account of a request. Returns whether it is answered."""
-        passed_s = now_s - self.at_s
-        self.at_s = now_s
-        self.left = min(ASKED_BURST, self.left + passed_s * ASKED_HZ)
-        if self.left < 1:
-            return False
-        self.left -= 1
-        return True
-
-    def pay(self, took_s: float) -> None:
-        """Count an answer that took long as several."""
-        others = max(0.0, took_s / ASKED_S - 1)
-        self.left = max(self.left - others, -ASKED_BURST)
 
 
 class Flood:
@@ -111,7 +84,7 @@ class Flood:
         self._clock = clock
         self.shed: Counter[str] = Counter()
         self._senders: dict[_Key, _Sender] = {}
-        self._asked: dict[Topic, _Asked] = {}
+        self._asked: dict[Topic, Budget] = {}
         self._lock = threading.Lock()
 
     def before(self, deliver: Callable[[Arrival], None]) -> Callable[[Arrival], None]:
@@ -146,15 +119,20 @@ class Flood:
         """Take account of a request: nobody knows whose. Returns whether it is answered."""
         now_s = self._clock()
         with self._lock:
-            asked = self._asked.setdefault(request, _Asked(ASKED_BURST, now_s))
-            return asked.admits(now_s)
+            asked = self._asked.setdefault(request, Budget.full(ASKED_BURST, ASKED_HZ, now_s))
+            asked.refill(now_s)
+            is_answered = asked.left >= 1
+            if is_answered:
+                asked.spend(1, most_owed=0)
+            return is_answered
 
     def answered(self, request: Topic, took_s: float) -> None:
         """Take account of the time that a request took, with the sending of its answer."""
+        others = max(0.0, took_s / ASKED_S - 1)
         with self._lock:
             asked = self._asked.get(request)
             if asked is not None:
-                asked.pay(took_s)
+                asked.spend(others, most_owed=ASKED_BURST)
 
     def skipped(self, arrival: Arrival) -> Envelope | None:
         """Return the last message that was shed before `arrival`, of its source and topic, once:
@@ -194,7 +172,8 @@ class Flood:
         if not is_refused:
             usual_hz = flow_of(topic).rate_hz
             rate_hz, burst = FASTEST * usual_hz, KEPT_S * usual_hz
-        sender = _Sender(topic, source or "", is_refused, burst, rate_hz, burst, now_s)
+        budget = Budget.full(burst, rate_hz, now_s)
+        sender = _Sender(topic, source or "", is_refused, budget)
         self._senders[key] = sender
         return sender
 
