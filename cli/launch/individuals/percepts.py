@@ -33,6 +33,8 @@ class Sight:
 
 MAX_SIGHTS = 32_768
 """Percepts that are kept: of some half an hour. Of a longer drive the last ones count."""
+MAX_OLDER_SIGHTS = MAX_SIGHTS // 4
+"""Older ones that may wait to be forgotten together."""
 
 
 class PerceptTally:
@@ -83,7 +85,7 @@ class PerceptTally:
                         sight = Sight(*key, tuple(percept.outline_px), message.calibration)
                         self._perceived[key] = sight
                         self.seen.append(sight)
-                if len(self.seen) > 2 * MAX_SIGHTS:
+                if len(self.seen) > MAX_SIGHTS + MAX_OLDER_SIGHTS:
                     self._forget(self.seen[-MAX_SIGHTS].stamp_ns)
             case Delta():
                 self._on_delta(message)

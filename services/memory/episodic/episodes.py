@@ -18,6 +18,11 @@ HOUR_NS = 3_600_000_000_000
 CONSOLIDATED_ACTIVATION = 0.6
 """Activation from which on an episode is consolidated; chosen, not tuned."""
 
+MAX_TRANSIENT = 1000
+"""Episodes in Transient Episodic Memory: some half an hour of driving. Sparse distributed memory
+holds about as many with its defaults.
+"""
+
 KeptEpisode = TransientEpisode | DeclarativeEpisode
 
 
@@ -93,6 +98,8 @@ class Episodes:
             elif episode.run != run or level <= 0.0:
                 self.forget(episode.number)
 
+        self._forget_weakest(now_ns)
+
         # Declarative Memory keeps the newest.
         known = self._known.items()
         numbers = sorted(number for number, each in known if isinstance(each, DeclarativeEpisode))
@@ -127,6 +134,17 @@ class Episodes:
         self._changed = set()
         self._forgotten = []
         return changes
+
+    def _forget_weakest(self, now_ns: int) -> None:
+        """Forget the least active episodes in Transient Episodic Memory that are too many."""
+        levels = {}
+        for number, episode in self._known.items():
+            if isinstance(episode, TransientEpisode):
+                levels[number] = self._activation(episode, now_ns)
+
+        strongest_last = sorted(levels, key=lambda number: (levels[number], number))
+        for number in strongest_last[:-MAX_TRANSIENT]:
+            self.forget(number)
 
     def _activation(self, episode: TransientEpisode, now_ns: int) -> float:
         """Compute an episode's activation now, by linear decay as in LIDA's framework."""

@@ -8,7 +8,7 @@ import pytest
 from cogmap.schemas.memory import DeclarativeEpisode, TransientEpisode
 from cogmap.schemas.nodes import Remembered
 from cogmap.services.memory.episodic.config import EpisodicConfig
-from cogmap.services.memory.episodic.episodes import HOUR_NS, Episodes
+from cogmap.services.memory.episodic.episodes import HOUR_NS, MAX_TRANSIENT, Episodes
 
 BAKERY = Remembered(kind="object", label="bakery")
 CONFIG = EpisodicConfig(decay_per_h=0.1, consolidation_h=1.0, max_declarative=2)
@@ -105,6 +105,16 @@ def test_declarative_memory_forgets_its_oldest_episodes_where_it_is_full() -> No
 
     assert sorted(memories.known) == [2, 3]
     assert memories.take_changes().forgotten == ["episode/1"]
+
+
+def test_transient_memory_forgets_its_weakest_episodes_where_it_is_full() -> None:
+    strong = [transient(number) for number in range(1, MAX_TRANSIENT)]
+    weak = [transient(number, 0.5) for number in range(MAX_TRANSIENT, MAX_TRANSIENT + 3)]
+    memories = known(*strong, *weak)
+    memories.consolidate(1, 0)
+
+    newest_weak = weak[-1].number
+    assert sorted(memories.known) == [*range(1, MAX_TRANSIENT), newest_weak]
 
 
 def test_a_number_is_not_given_again_once_its_episode_is_forgotten() -> None:
