@@ -16,11 +16,9 @@ from cogmap.schemas.cognition import Broadcast, Competition
 from cogmap.schemas.graph import Delta, Operation, Phase, Snapshot, SnapshotRequest
 from cogmap.schemas.process import Clock, Presence
 from cogmap.schemas.sensing import Energy, Percepts, RangeScan, SelfMotion
-from cogmap.services.workspace.answer_delay import AnswerDelay
 from cogmap.services.workspace.association.individuals import Individuals, as_entered
 from cogmap.services.workspace.commit import Ledger, coalitions_of
 from cogmap.services.workspace.config import Config
-from cogmap.services.workspace.dispatch import MAX_ATTEMPTS, Dispatch, check_holder
 from cogmap.services.workspace.forgetting import Forgetting
 from cogmap.services.workspace.ingress import (
     check_percepts,
@@ -28,16 +26,18 @@ from cogmap.services.workspace.ingress import (
     first_operations,
     percept_operations,
 )
-from cogmap.services.workspace.lane import Lanes
 from cogmap.services.workspace.learning.base_level import learned_operations
 from cogmap.services.workspace.learning.consciousness import Consciousness
 from cogmap.services.workspace.offers import OFFERING, Offers
 from cogmap.services.workspace.senses import Sensed
+from cogmap.services.workspace.tasks.answer_delay import AnswerDelay
+from cogmap.services.workspace.tasks.dispatch import MAX_ATTEMPTS, Dispatch
+from cogmap.services.workspace.tasks.lane import Lanes
+from cogmap.services.workspace.tasks.late_tasks import LateTasks
+from cogmap.services.workspace.view_order import ViewOrder
 
 WORKERS = "codelets"
 COMPETITION = "global_workspace"
-# Tasks of cycles before whose answers are still taken: a bound, for some are never answered.
-MAX_LATE_TASKS = 256
 PHASES = (Phase.CORRECTION, Phase.LOCALIZATION, Phase.OBJECTS, Phase.ATTENTION)
 LANES_BEGIN = Phase.ATTENTION
 # Where a cycle continues after a commit of each phase; lanes are committed after the last one.
@@ -73,11 +73,10 @@ class Workspace:
         self._is_repeated = False
         self._context: CycleContext | None = None
         self._phase = 0
-        self._late: dict[str, set[str]] = {}
+        self._late_tasks = LateTasks()
         self._now_ns = 0
         self._begun_ns = -1
-        self._was_older = False
-        self._late_views = 0
+        self._view_order = ViewOrder()
 
     def restore(self, past: Iterable[Message]) -> None:
         """Restore the graph as it was left.
@@ -111,9 +110,7 @@ class Workspace:
         notes = []
         if not self._is_lockstep:
             notes += [*self._delay.notes(), *self._dispatch.notes(self._now_ns)]
-        if self._late_views:
-            notes.append(f"{self._late_views} times percepts were older than those before them")
-        return notes
+        return [*notes, *self._view_order.notes()]
 
     def on_motion(self, motion: SelfMotion) -> list[Message]:
         """Keep what moved until a cycle moves the self node by it."""
@@ -136,11 +133,10 @@ class Workspace:
         In lockstep percepts that are repeated while they wait begin it without the competition of
         the cycle before, which was lost with a process that was killed. While a cycle runs they
         have its tasks given once more, and those of one that ended without moving the self node
-        begin another. Older ones are ignored, but two in succession show that time has gone back:
-        as where a simulation begins anew, or where those before were of a time that is not true.
+        begin another. Late ones are ignored.
         """
         check_percepts(percepts)
-        if self._is_late(percepts):
+        if self._view_order.is_late(percepts.stamp_ns, self._begun_ns):
             return []
         waiting = self._waiting
         is_waiting = waiting is not None and waiting.stamp_ns == percepts.stamp_ns
@@ -190,13 +186,10 @@ class Workspace:
             self._delay.answer(proposal.task_id, self._now_ns)
             return self._continue_if_complete([])
 
-        holders = self._late.get(proposal.task_id)
-        if holders is None:
+        if not self._late_tasks.answer(proposal):
             return []
 
-        check_holder(proposal, holders)
         self._delay.answer(proposal.task_id, self._now_ns)
-        del self._late[proposal.task_id]
         if not self._ledger.validate([proposal]):
             return []
         if proposal.coalitions:
@@ -274,18 +267,6 @@ class Workspace:
             raise MessageError(
                 f"{name} of {message.source} is of cycle {message.cycle}, and the newest is {cycle}"
             )
-
-    def _is_late(self, percepts: Percepts) -> bool:
-        """Decide whether percepts are ignored: older than those of the last cycle, and the first
-        that are.
-        """
-        was_older = self._was_older
-        self._was_older = percepts.stamp_ns < self._begun_ns
-        if not self._was_older or was_older:
-            return False
-
-        self._late_views += 1
-        return True
 
     def _repeat(self) -> list[Message]:
         """Give the tasks of the cycle that runs once more, in lockstep: its view is shown again
@@ -408,10 +389,7 @@ class Workspace:
         """Commit the answers of the current phase; unanswered tasks may be answered later."""
         self._reject_failed(self._dispatch.failed)
         answers, unanswered = self._dispatch.collect()
-        self._late |= {lease.task.task_id: lease.holders for lease in unanswered}
-        while len(self._late) > MAX_LATE_TASKS:
-            del self._late[next(iter(self._late))]
-
+        self._late_tasks.put(unanswered)
         return self._commit_proposals(PHASES[self._phase], answers)
 
     def _commit_proposals(self, phase: Phase, proposals: list[Proposal]) -> list[Message]:

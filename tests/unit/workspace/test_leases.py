@@ -13,7 +13,7 @@ from cogmap.schemas.codelets import Task
 from cogmap.schemas.nodes import NEVER_NS, Self
 from cogmap.schemas.process import Presence
 from cogmap.services.codelets.sub_maps.coarse_places import EVERY_CYCLES
-from cogmap.services.workspace.dispatch import MAX_ATTEMPTS
+from cogmap.services.workspace.tasks.dispatch import MAX_ATTEMPTS
 from cogmap.testing import (
     PERIOD_NS,
     agent,

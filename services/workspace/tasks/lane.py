@@ -11,7 +11,7 @@ from cogmap.schemas.codelets import Proposal
 from cogmap.schemas.graph import Phase
 from cogmap.services.workspace.commit import Ledger
 from cogmap.services.workspace.config import Config
-from cogmap.services.workspace.dispatch import Dispatch
+from cogmap.services.workspace.tasks.dispatch import Dispatch
 
 LEASE_NS = 5_000_000_000
 """In real time, how long a worker may take for a background task."""
