@@ -9,8 +9,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from benchmarks.harness import (
     agent_modules,
     build,
@@ -130,7 +128,8 @@ def result(chosen: Visit, visitor: Visitor, wall_s: float) -> Town:
     """Judge the visit."""
     assert visitor.explored is not None
     buildings = visitor.explored.buildings
-    pose_at = {stamp_ns: np.array(pose) for stamp_ns, pose in visitor.tally.poses.items()}
+    true = visitor.tally.true
+    pose_at = dict(zip(true.stamps_ns.tolist(), true.poses, strict=True))
     errors = visitor.observer.errors()
     is_compared = errors.stamps_ns <= ERROR_S * 1e9
     closures, wrong = wrong_closures(visitor.closures.values(), pose_at, buildings)

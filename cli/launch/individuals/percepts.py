@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import msgspec
 import numpy as np
 
+from cogmap.evaluation.track import Track
 from cogmap.geometry.arrays import Floats
-from cogmap.geometry.polylines import interpolate
 from cogmap.schemas.base import Message
 from cogmap.schemas.graph import Delta, DropNode, Link, Links, Phase
 from cogmap.schemas.nodes import SATISFIED_BY, LinkKind, Object, Percept
@@ -18,21 +19,31 @@ from cogmap.schemas.sensing import Calibration, Percepts, TruePose
 @dataclass(slots=True)
 class Sight:
     """A percept of the view of `stamp_ns`; `label` is what its node in the graph is called, and
-    `object` the id of the node that it was given to, empty if it was given to none. `outline_px` is
-    its outline in the view of a camera that has this `calibration`.
+    `object` the id of the node that it was given to, empty if it was given to none. `outline` packs
+    `outline_px`, its outline in the view of a camera that has this `calibration`: thousands of
+    percepts are kept.
     """
 
     stamp_ns: int
     bearing_rad: float
     range_m: float
-    outline_px: tuple[tuple[int, int], ...] = ()
+    outline: bytes = b""
     calibration: Calibration | None = None
     label: str = ""
     object: str = ""
 
+    @property
+    def outline_px(self) -> list[tuple[int, int]]:
+        """Return the corners of its outline, column and row each."""
+        return _CORNERS.decode(self.outline) if self.outline else []
+
+
+_CORNERS = msgspec.msgpack.Decoder(list[tuple[int, int]])
 
 MAX_SIGHTS = 32_768
 """Percepts that are kept: of some half an hour. Of a longer drive the last ones count."""
+MAX_POSES = 65_536
+"""True poses that are kept: 54 minutes at twenty a second, and of a longer drive fewer a second."""
 MAX_OLDER_SIGHTS = MAX_SIGHTS // 4
 """Older ones that may wait to be forgotten together."""
 
@@ -40,8 +51,8 @@ MAX_OLDER_SIGHTS = MAX_SIGHTS // 4
 class PerceptTally:
     """Follows percepts, deltas and true poses. `seen` has all that was perceived, but for places to
     charge at; `entered` has the percepts that came into the agent's graph, with what they were
-    given to: of both the last MAX_SIGHTS at least. `poses` are the true x_m, y_m and heading_rad by
-    stamp. A view's percepts and their delta are from two processes: either may arrive first.
+    given to: of both the last MAX_SIGHTS at least. `true` is the robot's path. A view's percepts
+    and their delta are from two processes: either may arrive first.
 
     A percept is given to an object by its INSTANCE link, also by one that comes later. One without
     a link is given to the object that is made of it: the one of its label that enters the map in
@@ -50,11 +61,12 @@ class PerceptTally:
 
     def __init__(self) -> None:
         self.seen: list[Sight] = []
-        self.poses: dict[int, tuple[float, float, float]] = {}
+        self.true = Track(MAX_POSES)
         self._entered: list[Sight] = []
         self._newest: dict[str, Sight] = {}
         self._known: set[str] = set()
         self._perceived: dict[tuple[int, float, float], Sight] = {}
+        self._calibration: Calibration | None = None
 
     @property
     def entered(self) -> list[Sight]:
@@ -65,9 +77,7 @@ class PerceptTally:
         for sight in self._entered:
             key = (sight.stamp_ns, sight.bearing_rad, sight.range_m)
             perceived = self._perceived.get(key, sight)
-            outlined = replace(
-                sight, outline_px=perceived.outline_px, calibration=perceived.calibration
-            )
+            outlined = replace(sight, outline=perceived.outline, calibration=perceived.calibration)
             found.append(outlined)
 
         return found
@@ -77,25 +87,31 @@ class PerceptTally:
         match message:
             case TruePose():
                 pose = message.pose
-                self.poses[message.stamp_ns] = (pose.x_m, pose.y_m, pose.heading_rad)
+                self.true.add(message.stamp_ns, pose.x_m, pose.y_m, pose.heading_rad)
             case Percepts():
-                for percept in message.objects:
-                    if percept.function not in SATISFIED_BY.values():
-                        key = (message.stamp_ns, percept.bearing_rad, percept.range_m)
-                        sight = Sight(*key, tuple(percept.outline_px), message.calibration)
-                        self._perceived[key] = sight
-                        self.seen.append(sight)
-                if len(self.seen) > MAX_SIGHTS + MAX_OLDER_SIGHTS:
-                    self._forget(self.seen[-MAX_SIGHTS].stamp_ns)
+                self._on_percepts(message)
             case Delta():
                 self._on_delta(message)
+
+    def _on_percepts(self, percepts: Percepts) -> None:
+        if percepts.calibration != self._calibration:
+            self._calibration = percepts.calibration
+        for percept in percepts.objects:
+            if percept.function not in SATISFIED_BY.values():
+                key = (percepts.stamp_ns, percept.bearing_rad, percept.range_m)
+                outline = msgspec.msgpack.encode(percept.outline_px)
+                sight = Sight(*key, outline, self._calibration)
+                self._perceived[key] = sight
+                self.seen.append(sight)
+
+        if len(self.seen) > MAX_SIGHTS + MAX_OLDER_SIGHTS:
+            self._forget(self.seen[-MAX_SIGHTS].stamp_ns)
 
     def _forget(self, until_ns: int) -> None:
         """Forget what is older."""
         self.seen = [each for each in self.seen if each.stamp_ns >= until_ns]
         self._entered = [each for each in self._entered if each.stamp_ns >= until_ns]
         self._perceived = {key: each for key, each in self._perceived.items() if key[0] >= until_ns}
-        self.poses = {at_ns: pose for at_ns, pose in self.poses.items() if at_ns >= until_ns}
 
     def _on_delta(self, delta: Delta) -> None:
         made = []
@@ -144,16 +160,9 @@ class PerceptTally:
         """Return the true poses that (n,) sights were seen from, (n, 3), in the world's frame; NaN
         where they are unknown.
         """
-        stamps_ns = np.array(sorted(self.poses), np.int64)
-        poses = np.array([self.poses[stamp_ns] for stamp_ns in stamps_ns.tolist()])
-        wanted_ns = np.array([sight.stamp_ns for sight in sights], np.int64)
-        if not len(poses) or not len(wanted_ns):
-            return np.full((len(wanted_ns), 3), np.nan)
+        stamps_ns = np.array([sight.stamp_ns for sight in sights], np.int64)
+        if not len(self.true) or not len(stamps_ns):
+            return np.full((len(stamps_ns), 3), np.nan)
 
-        since_s = (stamps_ns - stamps_ns[0]) / 1e9
-        wanted_s = (wanted_ns - stamps_ns[0]) / 1e9
-        poses[:, 2] = np.unwrap(poses[:, 2])
-        known = interpolate(since_s, poses, wanted_s)
-
-        is_known = (wanted_s >= 0) & (wanted_s <= since_s[-1])
-        return np.where(is_known[:, None], known, np.nan)
+        is_known = self.true.covers(stamps_ns)
+        return np.where(is_known[:, None], self.true.at(stamps_ns), np.nan)
