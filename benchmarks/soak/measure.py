@@ -24,7 +24,8 @@ from cogmap.bus.zenoh_bus import ZenohBus
 from cogmap.cli.launch.command_line import cogmap_command, environment
 from cogmap.cli.launch.plan import MEMORY_NAME, STATE_NAME
 from cogmap.cli.progress import bar
-from cogmap.cli.run.child import DriveProcess, failure
+from cogmap.cli.run.child import DriveProcess
+from cogmap.cli.run.script import summary_after
 from cogmap.errors import CogmapError
 from cogmap.parallel import Progress
 from cogmap.runtime.client import Client
@@ -125,9 +126,11 @@ class Soak:
             def check() -> None:
                 """Raise CogmapError if the drive has ended."""
                 code = drive.poll()
-                if code is not None:
-                    shown.seek(0)
-                    raise failure(code, shown.read().decode(errors="replace"))
+                if code is None:
+                    return
+                shown.seek(0)
+                ended = summary_after(self._run, code, shown.read().decode(errors="replace"))
+                raise CogmapError(f"{ended.ended_by}: {ended.reason}")
 
             _await(lambda: listens(self._port), "router", check)
             recorder = stack.enter_context(_recorder(self._logs / "log.mcap", self._endpoint))
