@@ -33,7 +33,7 @@ class Episodes:
         self._config = config
         self._known: dict[int, KeptEpisode] = {}
         self._changed: set[int] = set()
-        self._forgotten: list[str] = []
+        self._forgotten: dict[str, None] = {}
         self._newest = 0
 
     @property
@@ -58,13 +58,15 @@ class Episodes:
         if self._known.get(episode.number) != episode:
             self._known[episode.number] = episode
             self._changed.add(episode.number)
+            # A store removes what is forgotten after it has put what has changed.
+            self._forgotten.pop(episode.key, None)
 
     def forget(self, number: int) -> None:
         """Forget the episode of a number, if there is one."""
         forgotten = self._known.pop(number, None)
         self._changed.discard(number)
         if forgotten is not None:
-            self._forgotten.append(forgotten.key)
+            self._forgotten[forgotten.key] = None
 
     def reinforce(self, number: int, amount: float, now_ns: int) -> None:
         """Raise the activation of an episode in Transient Episodic Memory that was conscious."""
@@ -130,9 +132,9 @@ class Episodes:
     def take_changes(self) -> Changes:
         """Take all that is not stored yet as it is; after this, everything counts as stored."""
         records: list[StoredRecord] = [self._known[number] for number in sorted(self._changed)]
-        changes = Changes(records, self._forgotten)
+        changes = Changes(records, list(self._forgotten))
         self._changed = set()
-        self._forgotten = []
+        self._forgotten = {}
         return changes
 
     def _forget_weakest(self, now_ns: int) -> None:

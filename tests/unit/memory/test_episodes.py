@@ -117,6 +117,14 @@ def test_transient_memory_forgets_its_weakest_episodes_where_it_is_full() -> Non
     assert sorted(memories.known) == [*range(1, MAX_TRANSIENT), newest_weak]
 
 
+def test_an_episode_that_is_put_again_before_it_was_stored_is_not_forgotten() -> None:
+    memories = known(transient())
+    memories.forget(1)
+    memories.put(transient())
+
+    assert memories.take_changes() == ([transient()], [])
+
+
 def test_a_number_is_not_given_again_once_its_episode_is_forgotten() -> None:
     memories = known(transient(7))
     memories.forget(7)
