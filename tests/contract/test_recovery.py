@@ -89,12 +89,11 @@ class Keeper:
 
     def __init__(self, network: OverZenoh) -> None:
         self.graph = Graph()
-        self.publisher = network.join()
-        self.publisher.declare(topics.DELTA)
         module = Module("workspace").serve(
             topics.SNAPSHOT_REQUEST, topics.SNAPSHOT, lambda request: self.graph.snapshot()
         )
         self.shell = Shell(module, network.join(), health=False)
+        self.shell.bus.declare(topics.DELTA)
 
     def commit(self, number: int) -> None:
         """Add so many nodes, each in a delta of its own."""
@@ -110,7 +109,7 @@ class Keeper:
                 seq=version,
             )
             self.graph.apply(delta)
-            publish(self.publisher, delta)
+            publish(self.shell.bus, delta, incarnation=self.shell.publisher.incarnation)
 
 
 def test_a_loss_beyond_the_cache_is_counted_and_a_snapshot_mends_the_graph(
@@ -124,7 +123,7 @@ def test_a_loss_beyond_the_cache_is_counted_and_a_snapshot_mends_the_graph(
     follower.open()
 
     with working(keeper.shell):
-        meet(keeper.publisher, follower.bus)
+        meet(keeper.shell.bus, follower.bus)
         keeper.commit(1)
         spin_until(lambda: replica.version == 1, follower)
 
