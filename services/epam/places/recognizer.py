@@ -7,7 +7,8 @@ somewhere new. How likely a view is at a place follows from how far its similari
 different places have in common by chance (chance.py), which is estimated on the way: it is another
 in every town, light and camera. From one view to the next the place advances by none to three
 remembered ones, whatever the speed. A place that is recognized is not remembered again (Churchill
-and Newman 2012), so memory grows with what is new.
+and Newman 2012), nor is one that is known by a single view, while it is not decided which place it
+is: so memory grows with what is new.
 """
 
 from __future__ import annotations
@@ -71,6 +72,7 @@ class PlaceRecognizer:
         self._last_code: Bytes | None = None
         self._nearest: int | None = None
         self._best_score: float | None = None
+        self._is_known = False
         self._matches: list[PlaceMatch] = []
 
     @property
@@ -108,9 +110,10 @@ class PlaceRecognizer:
         vector = self._standard.add(code)
         self._update_belief(vector)
         self._matches = self._likeliest_match()
-        if not self._matches and self._best_score is not None:
+        is_known = self._is_known or bool(self._matches)
+        if not is_known and self._best_score is not None:
             self._chance.add_best(self._best_score)
-        if self._matches or not learning:
+        if is_known or not learning:
             return list(self._matches), []
 
         view = RememberedView(frame=frame, view_ns=view_ns, code=Array.of(code))
@@ -160,9 +163,10 @@ class PlaceRecognizer:
         # How much likelier each remembered view's place makes the observed one than another place;
         # recent views do not match.
         old = int(np.searchsorted(self._step_of_view, self._step - RECENT_VIEWS, side="right"))
-        similarities = self._vectors[:old] @ vector
+        similarities = (self._vectors[:old] @ vector).astype(np.float64)
         self._nearest = int(similarities.argmax()) if old else None
-        scores = self._chance.scores(similarities.astype(np.float64))
+        self._is_known = self._chance.is_known(similarities)
+        scores = self._chance.scores(similarities)
         self._best_score = float(scores.max()) if old else None
         log_odds = LOG_ODDS_SLOPE * (scores - self._chance.best + EVEN_BELOW_BEST)
 

@@ -175,9 +175,31 @@ def test_a_recognized_place_is_not_remembered_again() -> None:
 
     matches, remembered = _drive(recognizer, evening, LENGTH)
 
-    unrecognized = [match for match in matches if match is None]
-    assert len(remembered) == len(unrecognized)
-    assert len(unrecognized) <= 10
+    recognized = {number for number, match in enumerate(matches, LENGTH) if match}
+    assert len(recognized) >= 20
+    assert not recognized & {view.frame for view in remembered}
+
+
+def test_a_known_place_that_is_not_recognized_yet_is_not_remembered_again() -> None:
+    route = _route(1)
+    other = _route(2)
+    recognizer = _recognizer_after(route)
+    views = [*_along(other, range(10)), route.code(15), *_along(other, range(10, 20))]
+
+    matches, remembered = _drive(recognizer, views, LENGTH)
+    frames = {view.frame for view in remembered}
+
+    assert not any(matches)
+    assert frames == set(range(LENGTH, LENGTH + 21)) - {LENGTH + 10}
+
+
+def test_lap_after_lap_adds_few_views() -> None:
+    route = _route(1)
+    recognizer = _recognizer_after(route)
+    for lap in range(1, 6):
+        _drive(recognizer, _lap(route), lap * LENGTH)
+
+    assert len(list(recognizer.all)) <= 1.2 * LENGTH
 
 
 def test_a_robot_at_rest_remembers_one_view() -> None:
