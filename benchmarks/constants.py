@@ -48,7 +48,6 @@ OF_CODELETS = (
     "samples",
     "kept_samples",
     "landmark_samples",
-    "largest_landmark_sd_m",
     "landmark_jitter_m",
     "revisit_s",
     "closure_spacing_s",

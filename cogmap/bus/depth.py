@@ -23,7 +23,8 @@ class Flow:
 
 
 # What a camera drive and a percept-level drive of the demo's towns had at most, at five views a
-# second; a topic that is not here carries a few small messages a view.
+# second; of what is replayed and stored, on laps of 386 m. A topic that is not here carries a few
+# small messages a view.
 _USUAL = Flow(5.0, 1024)
 _FLOWS = {
     topics.PERCEPTS: Flow(5.0, 6500),
@@ -35,7 +36,8 @@ _FLOWS = {
     topics.DELTA: Flow(23.0, 8500),
     topics.COALITIONS: Flow(5.0, 5500),
     topics.BROADCAST: Flow(5.0, 4500),
-    topics.STORED: Flow(0.2, 51_000),
+    topics.REPLAY: Flow(0.2, 88_000),
+    topics.STORED: Flow(0.2, 105_000),
     topics.TRUE_TOWN: Flow(0.2, 14_000),
     topics.BEHAVIOURS: Flow(5.0, 1500),
     topics.ACTION: Flow(5.0, 1500),

@@ -20,6 +20,7 @@ from cogmap.bus.access import handshake
 from cogmap.bus.access.others import everybody
 from cogmap.bus.access.rules import access_control
 from cogmap.errors import AccessError, NoRouterError, PortInUseError, UsageError
+from cogmap.heap import share_arenas
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Delivery, Topic
 
@@ -167,7 +168,7 @@ def open_client(
         settings["transport/link/tls"] = keys.to_connect()
 
     try:
-        session = zenoh.open(_config("client", **settings))
+        session = _open("client", settings)
     except zenoh.ZError:
         if keys is None and handshake.speaks_tls(_address(endpoint)):
             raise AccessError(
@@ -212,7 +213,7 @@ def open_router(endpoint: str, keys: Keys | None = None) -> zenoh.Session:
         settings["listen/endpoints"] = [_secured(endpoint)]
         settings["transport/link/tls"] = keys.to_listen()
         settings["access_control"] = access_control(everybody(keys.folder).values())
-    return zenoh.open(_config("router", **settings))
+    return _open("router", settings)
 
 
 def from_here(endpoint: str) -> str:
@@ -241,7 +242,8 @@ def check_free(endpoint: str) -> None:
             ) from None
 
 
-def _config(mode: str, **settings: object) -> zenoh.Config:
+def _open(mode: str, settings: dict[str, object]) -> zenoh.Session:
+    share_arenas()
     config = zenoh.Config()
     requests = [topic for topic in topics.ALL if topic.delivery is Delivery.ON_REQUEST]
     settings |= {
@@ -266,7 +268,7 @@ def _config(mode: str, **settings: object) -> zenoh.Config:
     }
     for key, value in settings.items():
         config.insert_json5(key, json.dumps(value))
-    return config
+    return zenoh.open(config)
 
 
 def is_exposed(endpoint: str) -> bool:

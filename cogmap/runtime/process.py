@@ -13,9 +13,9 @@ from types import FrameType
 from cogmap.bus.access.subjects import ROUTER
 from cogmap.bus.session import EXPOSED, check_name, from_here, is_exposed, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
+from cogmap.heap import keep_freed_memory
 from cogmap.runtime import environment
 from cogmap.runtime.company import company_at, watch_company
-from cogmap.runtime.heap import keep_freed_memory
 from cogmap.runtime.module import Module
 from cogmap.runtime.shell import Shell
 from cogmap.runtime.state import published

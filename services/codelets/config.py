@@ -53,13 +53,6 @@ class Config(msgspec.Struct, kw_only=True, frozen=True, forbid_unknown_fields=Tr
         int,
         Meta(description="Samples of each landmark's position.", ge=10, le=10_000),
     ] = 200
-    largest_landmark_sd_m: Annotated[
-        PositiveMetres,
-        Meta(
-            description="Landmarks whose position is less certain do not inform localization, "
-            "standard deviation in m."
-        ),
-    ] = 4.0
     landmark_jitter_m: Annotated[
         PositiveMetres,
         Meta(

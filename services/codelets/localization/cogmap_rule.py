@@ -93,7 +93,7 @@ def localized(step: Step, config: Config, rng: np.random.Generator) -> Localized
         before_it = agent.misfits
         found = Estimate(moved, 1.0, before_it.count, before_it.label, before_it.is_lost)
 
-    seen = measurements(task.percepts, graph, config.largest_landmark_sd_m, stationary_since_ns)
+    seen = measurements(task.percepts, graph, stationary_since_ns)
     if seen is not None:
         since = variances - variances_when_placed(graph, seen)
         weights = new_share(moved, seen, since)

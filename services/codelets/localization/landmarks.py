@@ -36,6 +36,7 @@ from cogmap.services.codelets.localization.information import INDEPENDENT_RAD, n
 from cogmap.services.codelets.localization.measurement_model import (
     FARTHEST_M,
     GATE,
+    LARGEST_SD_M,
     MAX_SD_SHARE,
     MIN_SIGHTINGS,
     is_seen_from_here,
@@ -50,7 +51,7 @@ from cogmap.services.codelets.localization.sampling import (
 
 # Few samples represent all positions between them, as far apart as three of their mean gaps.
 GAP = 3.0
-# The agent's own uncertainty counts for a landmark up to this share of `largest_landmark_sd_m`.
+# The agent's own uncertainty counts for a landmark up to this share of LARGEST_SD_M.
 LOCAL_SHARE = 0.5
 # A sighting that deviates by this many standard deviations counts half as much as one that fits.
 DOUBTED = 2.0
@@ -134,7 +135,7 @@ def updated(landmark: Object, percept: Percept, agent: Self, task: Task, config:
 
     rng = generator(f"{task.task_id}/{percept.label}")
     before = landmark.positions_m()
-    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
+    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng))
     selves = rng.permutation(resample(selves, len(before), 0.0, rng))
     mahalanobis2 = _mahalanobis2(before, selves, percept)
     if mahalanobis2.min() < GATE**2 and is_well_placed(landmark, percept):
@@ -223,7 +224,7 @@ def moved_towards(
     return np.asarray(moved_m + offsets_m @ shrink.T)
 
 
-def nearby_selves(selves: Floats, config: Config) -> Floats:
+def nearby_selves(selves: Floats) -> Floats:
     """Return (n, 7) samples of the self for placing landmarks relative to it, which is known
     however lost the agent is.
 
@@ -235,7 +236,7 @@ def nearby_selves(selves: Floats, config: Config) -> Floats:
     sd = spread(selves[:, :POSE_COLUMNS], mean)
 
     position_sd_m = max(float(np.hypot(sd[0], sd[1])), 1e-9)
-    share = min(1.0, LOCAL_SHARE * config.largest_landmark_sd_m / position_sd_m)
+    share = min(1.0, LOCAL_SHARE * LARGEST_SD_M / position_sd_m)
     if share == 1.0:
         return selves
 

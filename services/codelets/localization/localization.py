@@ -110,7 +110,7 @@ def _from_mean(step: Step, config: Config, rng: np.random.Generator) -> Localize
     """
     agent = step.agent
     samples = paper_rule.moved(agent.samples.numpy(), step.motions, config, rng)
-    seen = measurements(step.task.percepts, step.graph, config.largest_landmark_sd_m, NEVER_NS, 1)
+    seen = measurements(step.task.percepts, step.graph, NEVER_NS, 1)
     share = 1.0
     if seen is not None:
         rule = spiking_rule if config.localization == "spiking" else paper_rule

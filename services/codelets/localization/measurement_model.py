@@ -16,7 +16,10 @@ from cogmap.schemas.nodes import NEVER_NS, Object, object_id
 from cogmap.schemas.sensing import Percept
 from cogmap.services.codelets.localization.motion_model import RANGE
 
-# A landmark informs that is known to this share of its distance.
+# A landmark informs whose position is known to this, as a standard deviation, and to this share of
+# its distance. Half of the first or twice moved no error by more than 1 % on two towns and two
+# cities from seed 9901 on.
+LARGEST_SD_M = 4.0
 MAX_SD_SHARE = 0.5
 # One sighting may have had another's name.
 MIN_SIGHTINGS = 2
@@ -158,13 +161,12 @@ def cost_of_mistake() -> float:
 def measurements(
     percepts: Iterable[Percept],
     graph: Graph,
-    largest_sd_m: float,
     stationary_since_ns: int,
     min_sightings: int = MIN_SIGHTINGS,
 ) -> Measurements | None:
     """Choose the percepts whose object on the map is known well enough to inform; None without any.
 
-    The object must be known to `largest_sd_m`, and to half of its distance: samples on a ring
+    The object must be known to LARGEST_SD_M, and to half of its distance: samples on a ring
     around the agent have their mean where nothing is. It must also have been seen at least
     `min_sightings` times, since a first sighting may have had another's name, and not from where
     the agent has stood since `stationary_since_ns`: the same view again is no new evidence.
@@ -184,7 +186,7 @@ def measurements(
         offset_m = samples - mean_m
         covariance_m2 = offset_m.T @ offset_m / max(1, len(samples) - 1)
 
-        limit_m = largest_sd_m
+        limit_m = LARGEST_SD_M
         if percept.has_range:
             limit_m = min(limit_m, MAX_SD_SHARE * percept.range_m)
         if float(covariance_m2[0, 0] + covariance_m2[1, 1]) <= 2 * limit_m**2:

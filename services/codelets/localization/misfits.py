@@ -118,7 +118,7 @@ def relocalized(
     rng: np.random.Generator,
 ) -> Estimate:
     """Return where the agent is by all `percepts`, after a view in which something does not fit."""
-    seen = measurements(percepts, graph, config.largest_landmark_sd_m, NEVER_NS)
+    seen = measurements(percepts, graph, NEVER_NS)
     if seen is None:
         return found
     if found.is_lost:

@@ -46,7 +46,7 @@ def run(task: Task, graph: Graph, config: Config) -> Answer:
 
     (percept,) = task.percepts
     rng = generator(task.task_id)
-    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng), config)
+    selves = nearby_selves(with_gains(agent.samples.numpy(), config, rng))
     selves = resample(selves, config.landmark_samples, 0.0, rng)
 
     node = Object(

@@ -20,7 +20,6 @@ QUIET = WorkerConfig(
     samples=60,
     kept_samples=30,
     landmark_samples=40,
-    largest_landmark_sd_m=1e-6,
     correct="positions",
     path_variance_per_m=0.01,
     heading_variance_per_m=1e-4,

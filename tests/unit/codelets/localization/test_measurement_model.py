@@ -35,7 +35,7 @@ def _seen() -> Measurements:
     where_m = rng.normal((RANGE_M, 0.0), 0.1, (200, 2))
     graph = graph_of(landmark("house", where_m, sightings=5))
 
-    found = measurements([percept("house")], graph, 4.0, NEVER_NS)
+    found = measurements([percept("house")], graph, NEVER_NS)
     assert found is not None
     return found
 
