@@ -31,7 +31,7 @@ MOST_BEYOND = 0.5
 # The greatest similarity of a view of a known place is so many standard deviations beyond the
 # median of all. On the towns of seeds 2007 and 2008, nine in ten views of known places were 8 and
 # more beyond it, in another light, too; nine in ten of new places 5 and less.
-KNOWN_BEYOND = 6.0
+KNOWN_BEYOND = 7.0
 # The standard deviation of normal values over the median of what they differ from their median.
 # A few that are far off do not change it: places that were remembered on several laps.
 SD_OVER_MEDIAN = 1.4826
@@ -51,27 +51,32 @@ class Chance:
         """Count the best score of a view of a new place."""
         self.best += (min(score, self.best + MOST_BEYOND) - self.best) / BEST_VIEWS
 
-    def is_known(self, similarities: Floats) -> bool:
-        """Return whether a view with these similarities, to all that is remembered, shows a place
-        that is known.
+    def judge(self, similarities: Floats) -> tuple[Floats, bool]:
+        """Return how many standard deviations each similarity of a view, to the remembered ones in
+        their order, is over those to different places, and whether the place is known. Count them.
+
+        Those to a known place widen the spread around it, as do those of its other views; they
+        leave the median as it is, and the spread about that.
         """
         count = len(similarities)
         if not count:
-            return False
+            return np.empty(0), False
 
+        around = self._beyond_those_around(similarities)
+        beyond = self._beyond_median(similarities)
+        is_known = bool(beyond.max() > KNOWN_BEYOND)
+        return (beyond if is_known else around), is_known
+
+    def _beyond_median(self, similarities: Floats) -> Floats:
+        count = len(similarities)
         usual = np.median(similarities)
         spread = SD_OVER_MEDIAN * np.median(np.abs(similarities - usual))
         known = count / (count + PRIOR_VIEWS)
         variance = known * spread**2 + (1 - known) * self._variance
-        return bool(similarities.max() - usual > KNOWN_BEYOND * np.sqrt(variance))
+        return np.asarray((similarities - usual) / np.sqrt(variance))
 
-    def scores(self, similarities: Floats) -> Floats:
-        """Return how many standard deviations each similarity of a view, to the remembered ones in
-        their order, is over those to different places, and count them.
-        """
+    def _beyond_those_around(self, similarities: Floats) -> Floats:
         count = len(similarities)
-        if not count:
-            return np.empty(0)
 
         # The window around each view, which ends where memory ends.
         width = min(count, WINDOW_VIEWS)

@@ -7,8 +7,8 @@ somewhere new. How likely a view is at a place follows from how far its similari
 different places have in common by chance (chance.py), which is estimated on the way: it is another
 in every town, light and camera. From one view to the next the place advances by none to three
 remembered ones, whatever the speed. A place that is recognized is not remembered again (Churchill
-and Newman 2012), nor is one that is known by a single view, while it is not decided which place it
-is: so memory grows with what is new.
+and Newman 2012), nor is one that is known, while it is not decided which: so memory grows with
+what is new.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ P_LOST = 0.02
 EVEN_BELOW_BEST = 0.3
 LOG_ODDS_SLOPE = 0.6
 MIN_LOG_ODDS = -3.0
-MAX_LOG_ODDS = 2.0
+MAX_LOG_ODDS = 3.0
 NEIGHBOURS = 4
 # A view that differs less from the last, in standard deviations, shows a robot at rest.
 CHANGE_AT_REST = 0.25
@@ -165,8 +165,7 @@ class PlaceRecognizer:
         old = int(np.searchsorted(self._step_of_view, self._step - RECENT_VIEWS, side="right"))
         similarities = (self._vectors[:old] @ vector).astype(np.float64)
         self._nearest = int(similarities.argmax()) if old else None
-        self._is_known = self._chance.is_known(similarities)
-        scores = self._chance.scores(similarities)
+        scores, self._is_known = self._chance.judge(similarities)
         self._best_score = float(scores.max()) if old else None
         log_odds = LOG_ODDS_SLOPE * (scores - self._chance.best + EVEN_BELOW_BEST)
 
