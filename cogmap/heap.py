@@ -34,6 +34,15 @@ def share_arenas() -> None:
     _set(_M_ARENA_MAX, ARENAS)
 
 
+def return_freed_memory() -> None:
+    """Return to the kernel all memory that was freed, also what lies between blocks in use: by
+    itself glibc returns only what lies after the last of them.
+    """
+    trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    if trim is not None:
+        trim(0)
+
+
 def _set(option: int, value: int) -> None:
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)
     if mallopt is not None:

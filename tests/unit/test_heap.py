@@ -9,11 +9,12 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cogmap.heap import ARENAS, keep_freed_memory, share_arenas
+from cogmap.heap import ARENAS, keep_freed_memory, return_freed_memory, share_arenas
 
 ARRAYS = 6
 ARRAY_BYTES = 2**20
@@ -21,6 +22,8 @@ ROUNDS = 10
 FEW_FAULTS = 100
 THREADS = 12
 BLOCK_BYTES = 4096
+BLOCKS = 10_000
+PAGE_BYTES = resource.getpagesize()
 
 needs_glibc = pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="sets glibc's options")
 
@@ -76,10 +79,28 @@ def write_shared_arenas() -> None:
     write_arenas()
 
 
+def resident_bytes() -> int:
+    """The memory of this process that is in use or not returned."""
+    _, pages, *_ = Path("/proc/self/statm").read_text().split()
+    return int(pages) * PAGE_BYTES
+
+
+def write_returned() -> None:
+    """Write how many bytes are returned of blocks that were freed, before one that is in use."""
+    keep_freed_memory()
+    blocks = [b"x" * number for number in range(BLOCK_BYTES, BLOCK_BYTES + BLOCKS)]
+    last = blocks[-1]
+    del blocks
+    freed_bytes = resident_bytes()
+    return_freed_memory()
+    sys.stdout.write(f"{freed_bytes - resident_bytes()} {len(last)}")
+
+
 MEASURED_BY: dict[str, Callable[[], None]] = {
     "faults": write_faults,
     "arenas": write_arenas,
     "shared": write_shared_arenas,
+    "returned": write_returned,
 }
 
 
@@ -94,6 +115,13 @@ def test_arrays_reuse_the_memory_of_arrays_that_were_freed() -> None:
 def test_many_threads_share_few_arenas() -> None:
     assert output_of("arenas").count("<heap nr=") > ARENAS
     assert output_of("shared").count("<heap nr=") == ARENAS
+
+
+@needs_glibc
+def test_freed_memory_before_a_block_in_use_is_returned() -> None:
+    returned_bytes, _ = map(int, output_of("returned").split())
+
+    assert returned_bytes > BLOCKS * BLOCK_BYTES / 2
 
 
 if __name__ == "__main__":
