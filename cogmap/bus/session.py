@@ -242,11 +242,12 @@ def check_free(endpoint: str) -> None:
             ) from None
 
 
-def _open(mode: str, settings: dict[str, object]) -> zenoh.Session:
+def _open(mode: str, own: dict[str, object]) -> zenoh.Session:
+    """Open a session with its `own` settings and those that all have."""
     share_arenas()
     config = zenoh.Config()
     requests = [topic for topic in topics.ALL if topic.delivery is Delivery.ON_REQUEST]
-    settings |= {
+    settings = own | {
         "mode": mode,
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,

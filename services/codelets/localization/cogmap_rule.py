@@ -110,7 +110,7 @@ def localized(step: Step, config: Config, rng: np.random.Generator) -> Localized
     odometry = dead_reckon(agent.odometry.pose(), motions, gains)
     if seen is not None and found.misfit_count:
         percepts = recent_percepts(found, task, agent, graph, odometry)
-        found = relocalized(found, percepts, graph, config, rng)
+        found = relocalized(found, percepts, graph, rng)
 
     if found.was_kidnapped:
         # Self-motion did not measure the kidnapping: the step there counts as one that was driven,

@@ -16,7 +16,6 @@ from cogmap.graph.graph import Graph
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.nodes import NEVER_NS, Self
 from cogmap.schemas.sensing import Percept
-from cogmap.services.codelets.config import Config
 from cogmap.services.codelets.localization.measurement_model import (
     Measurements,
     compare,
@@ -114,7 +113,6 @@ def relocalized(
     found: Estimate,
     percepts: list[Percept],
     graph: Graph,
-    config: Config,
     rng: np.random.Generator,
 ) -> Estimate:
     """Return where the agent is by all `percepts`, after a view in which something does not fit."""

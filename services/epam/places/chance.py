@@ -29,8 +29,8 @@ PRIOR_BEST = 2.0
 BEST_VIEWS = 100
 MOST_BEYOND = 0.5
 # The greatest similarity of a view of a known place is so many standard deviations beyond the
-# median of all. On the towns of seeds 2007 and 2008, nine in ten views of known places were 8 and
-# more beyond it, in another light, too; nine in ten of new places 5 and less.
+# median of all. On the towns of seeds 2007 and 2008, on which it was chosen, 84 and 91 % of the
+# views of known places were, in another light, and 0 and 1 % of those of new ones.
 KNOWN_BEYOND = 7.0
 # The standard deviation of normal values over the median of what they differ from their median.
 # A few that are far off do not change it: places that were remembered on several laps.
