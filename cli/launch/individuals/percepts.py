@@ -40,8 +40,8 @@ class Sight:
 
 _CORNERS = msgspec.msgpack.Decoder(list[tuple[int, int]])
 
-MAX_SIGHTS = 32_768
-"""Percepts that are kept: of some half an hour. Of a longer drive the last ones count."""
+MAX_SIGHTS = 16_384
+"""Percepts that are kept: of some quarter of an hour. Of a longer drive the last ones count."""
 MAX_POSES = 65_536
 """True poses that are kept: 54 minutes at twenty a second, and of a longer drive fewer a second."""
 MAX_OLDER_SIGHTS = MAX_SIGHTS // 4
