@@ -48,7 +48,7 @@ def examine(expected: Iterable[str], observed: Observed, system: System) -> list
         *complaints(observed),
         *(finding for _, finding in refused if finding not in too_old),
         *(moment.slow_machine(observed, late) or late),
-        *contradictions(system),
+        *contradictions(observed, system),
         *unknown_publishers(observed),
         *truth_leaks(modules, system),
     ]
@@ -200,10 +200,19 @@ def unknown_publishers(observed: Observed) -> Iterator[Finding]:
             )
 
 
-def contradictions(system: System) -> Iterator[Finding]:
-    """Yield a finding for each topic that several processes publish and one alone may."""
+def contradictions(observed: Observed, system: System) -> Iterator[Finding]:
+    """Yield a finding for each topic that several processes publish and one alone may.
+
+    Those that report to have published none of it do not count: where the simulation senses
+    percepts, sensory memory and EPAM stand idle.
+    """
     for topic in topics.ALL:
-        publishing = system.doing(Role.PUBLISHES, topic)
+        publishing = []
+        for process in system.doing(Role.PUBLISHES, topic):
+            reports = observed.health.get(process.name)
+            if reports is None or reports[-1].emitted.get(topic.name):
+                publishing.append(process)
+
         if topic.shared or len(publishing) < 2:
             continue
         names = ", ".join(process.name for process in publishing)

@@ -60,17 +60,27 @@ def observed(*reports: Health, clock_rate: float | None = 1.0) -> Observed:
     return Observed({SENSORY}, by_instance, clock_rate)
 
 
-def test_two_publishers_of_a_topic_that_one_alone_may_publish_are_named() -> None:
-    second = Process("2", Member("sensory", "sensory-2"))
-    uses = [Use(topics.SCAN.name, Role.PUBLISHES, each) for each in (Process("1", SENSORY), second)]
-    on = System("agent", (Process("1", SENSORY), second), tuple(uses))
+def two_publishers() -> System:
+    """A system in which sensory and sensory-2 may publish scans."""
+    processes = (Process("1", SENSORY), Process("2", Member("sensory", "sensory-2")))
+    uses = [Use(topics.SCAN.name, Role.PUBLISHES, process) for process in processes]
+    return System("agent", processes, tuple(uses))
 
-    found = findings(observed(health(1.0), health(2.0), health(3.0)), on)
+
+def test_two_publishers_of_a_topic_that_one_alone_may_publish_are_named() -> None:
+    found = findings(observed(health(1.0), health(2.0), health(3.0)), two_publishers())
 
     assert found == [
         "sensory/scan: sensory, sensory-2 publish it, and contradict each other: "
         "end all but one of them"
     ]
+
+
+def test_a_process_that_has_published_none_of_a_topic_contradicts_nobody() -> None:
+    well = observed(health(1.0), health(2.0), health(3.0))
+    well.health["sensory-2"] = [health(1.0, emitted={}), health(3.0, emitted={})]
+
+    assert findings(well, two_publishers()) == []
 
 
 def test_a_system_that_is_well_has_no_findings() -> None:
