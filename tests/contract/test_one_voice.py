@@ -159,7 +159,7 @@ def test_whoever_publishes_is_on_the_bus_with_its_incarnation(
 
     here = wheels.peer.bus
     wait_until(lambda: len(here.incarnations()) == 1, "it is listed")
-    # Zenoh's own query misses, one time in a hundred, a token that the session watches.
+    # Zenoh's own query misses now and then a token that the session watches.
     listed = [here.incarnations() for _ in range(40)]
     (incarnation,) = listed[0]
     assert (incarnation.source, incarnation.number) == ("sim", FIRST)
