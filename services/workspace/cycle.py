@@ -218,8 +218,8 @@ class Workspace:
         return self._continue_if_complete(published)
 
     def on_clock(self, clock: Clock) -> list[Message]:
-        """Revoke leases that have ended, and end a cycle at its deadline: in real time alone. Both
-        follow the delay of answers.
+        """Revoke leases that have ended, end a cycle at its deadline, and begin one that waited for
+        its scan: in real time alone. The first two follow the delay of answers.
 
         Each clock counts, even if earlier than the one before: else, after one that ran far ahead,
         no later deadline would be kept.
@@ -230,7 +230,7 @@ class Workspace:
 
         published = self._lanes.expire(self._ledger.graph.version, self._now_ns)
         if self._context is None:
-            return published
+            return [*published, *self._begin()]
 
         if self._now_ns > self._delay.deadline_ns(self._context.stamp_ns):
             published += self._commit_answers()
@@ -291,16 +291,15 @@ class Workspace:
         if self._context is not None or percepts is None:
             return []
 
-        if not self._sensed.is_complete(percepts.stamp_ns, self._moved_until_ns):
+        moved_ns = self._moved_until_ns
+        if not self._sensed.is_complete(percepts.stamp_ns, moved_ns, self._now_ns):
             return []
 
         graph = self._ledger.graph
         if self._is_interrupted(percepts):
             self._waiting = None
             entered = as_entered(percepts, graph)
-            self._context = self._sensed.context(
-                entered, self._moved_until_ns, graph.cycle, graph.version
-            )
+            self._context = self._sensed.context(entered, moved_ns, graph.cycle, graph.version)
             self._phase = PLACE_OF.get(graph.phase, -1)
             self._delay.begin(percepts.stamp_ns, self._now_ns)
             return self._next_phase()

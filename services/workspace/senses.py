@@ -86,13 +86,14 @@ class Scans:
     """The newest range scans, of which each cycle takes the one of its view.
 
     In lockstep a cycle does not begin before it has come; if no module takes part that publishes
-    scans, none is used. In real time it begins with the newest that is at most MAX_SCAN_AGE_NS
-    older than its view, or with none.
+    scans, none is used. In real time it waits for it, where scans have come before, until the clock
+    has passed the view: messages on different topics may overtake each other. Then it begins with
+    the newest that is at most MAX_SCAN_AGE_NS older than its view, or with none.
     """
 
     def __init__(self, run: Run) -> None:
         has_scanner = run.has_any(*SCANNERS)
-        self._awaited = run.lockstep and has_scanner
+        self._is_lockstep = run.lockstep
         self._ignored = run.lockstep and not has_scanner
         self._max_age_ns = 0 if run.lockstep else MAX_SCAN_AGE_NS
         self._scans: dict[int, RangeScan] = {}
@@ -121,9 +122,15 @@ class Scans:
 
         _put_last(self._scans, scan, MAX_SCANS)
 
-    def has(self, stamp_ns: int) -> bool:
+    def has(self, stamp_ns: int, now_ns: int) -> bool:
         """Decide whether the cycle of the view at `stamp_ns` waits for its scan no longer."""
-        return not self._awaited or stamp_ns in self._scans
+        if stamp_ns in self._scans or self._ignored:
+            return True
+        if self._is_lockstep:
+            return False
+        # Without a clock, or without scans, there is nothing to wait for.
+        is_moment_of_view = 0 < now_ns <= stamp_ns
+        return not self._scans or not is_moment_of_view
 
     def take(self, stamp_ns: int) -> RangeScan | None:
         """Take the scan for the cycle of the view at `stamp_ns`; None if there is none."""
@@ -205,10 +212,12 @@ class Sensed:
         """Keep the body's energy."""
         self._body.put(energy)
 
-    def is_complete(self, stamp_ns: int, moved_ns: int) -> bool:
-        """Decide whether all that the cycle of the view at `stamp_ns` waits for has come."""
+    def is_complete(self, stamp_ns: int, moved_ns: int, now_ns: int) -> bool:
+        """Decide whether all that the cycle of the view at `stamp_ns` waits for has come, while the
+        clock shows `now_ns`.
+        """
         has_motion = max(self._motions.newest_ns(), moved_ns) >= stamp_ns
-        return has_motion and self._scans.has(stamp_ns) and self._body.has(stamp_ns)
+        return has_motion and self._scans.has(stamp_ns, now_ns) and self._body.has(stamp_ns)
 
     def motions(self, stamp_ns: int, moved_ns: int) -> Array:
         """Return the motions since the self node was moved last, up to `stamp_ns`."""

@@ -133,6 +133,30 @@ def test_in_real_time_the_newest_scan_up_to_the_view_is_used(timely: Desk) -> No
     assert _rays(timely, 1) == [[0.0, 3.0]]
 
 
+def test_in_real_time_a_scan_that_its_view_overtook_is_waited_for(timely: Desk) -> None:
+    timely.feed(_scan(0))
+    _view(timely, 0)
+    timely.clock(stamp_ns(1))
+    _view(timely, 1)
+    assert timely.deltas[-1].cycle == 1
+
+    timely.feed(_scan(1, ((0.0, 3.0),)))
+    timely.work()
+    assert _rays(timely, 1) == [[0.0, 3.0]]
+
+
+def test_in_real_time_a_view_waits_for_its_scan_until_the_clock_has_passed(timely: Desk) -> None:
+    timely.feed(_scan(0))
+    _view(timely, 0)
+    timely.clock(stamp_ns(1))
+    _view(timely, 1)
+
+    timely.clock(stamp_ns(1) + 1)
+    timely.work()
+    assert _rays(timely, 1) is None
+    assert timely.deltas[-1].cycle == 2
+
+
 def test_in_real_time_a_scan_that_is_too_old_is_not_used(timely: Desk) -> None:
     timely.feed(_scan(0, late_ms=LATE_MS + 1))
     _view(timely, 0)
