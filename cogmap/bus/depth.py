@@ -37,6 +37,7 @@ _FLOWS = {
     topics.COALITIONS: Flow(5.0, 5500),
     topics.BROADCAST: Flow(5.0, 4500),
     topics.REPLAY: Flow(0.2, 88_000),
+    topics.ROUTE_REPLAY: Flow(0.2, 1000),
     topics.STORED: Flow(0.2, 105_000),
     topics.TRUE_TOWN: Flow(0.2, 14_000),
     topics.BEHAVIOURS: Flow(5.0, 1500),

@@ -7,9 +7,7 @@ from cogmap.bus.codec import Envelope
 REMEMBERED = 1024
 """Numbers of which the contents are known: as many as a publisher's cache holds."""
 MAX_UNLIKE = 4
-"""Contents that are known of one number: the last ones."""
-
-_Key = tuple[int, int]
+"""Contents that are known of one number beside the first: the last ones."""
 
 
 class Contents:
@@ -21,12 +19,17 @@ class Contents:
 
     def __init__(self) -> None:
         self.contradictions = 0
-        self._known: dict[_Key, list[int]] = {}
+        # Hashes alone: a recorder knows some ten thousand numbers, and goes on filling for hours
+        # where a source says little.
+        self._known: dict[int, int] = {}
+        self._unlike: dict[int, list[int]] = {}
 
     def contradicts(self, envelope: Envelope, payload: bytes) -> bool:
         """Decide whether another message with that number has come, and count it."""
-        known = self._known.get(_key(envelope))
-        if known is None or hash(payload) in known:
+        number = _number(envelope)
+        content = hash(payload)
+        first = self._known.get(number, content)
+        if content == first or content in self._unlike.get(number, ()):
             return False
 
         self.contradictions += 1
@@ -34,12 +37,18 @@ class Contents:
 
     def add(self, envelope: Envelope, payload: bytes) -> None:
         """Take note of a message that counts."""
-        known = self._known.setdefault(_key(envelope), [])
-        known.append(hash(payload))
-        del known[:-MAX_UNLIKE]
+        number = _number(envelope)
+        content = hash(payload)
+        if self._known.setdefault(number, content) != content:
+            unlike = self._unlike.setdefault(number, [])
+            unlike.append(content)
+            del unlike[:-MAX_UNLIKE]
+
         if len(self._known) > REMEMBERED:
-            del self._known[next(iter(self._known))]
+            oldest = next(iter(self._known))
+            del self._known[oldest]
+            self._unlike.pop(oldest, None)
 
 
-def _key(envelope: Envelope) -> _Key:
-    return envelope.incarnation, envelope.seq
+def _number(envelope: Envelope) -> int:
+    return hash((envelope.incarnation, envelope.seq))

@@ -50,6 +50,17 @@ def test_the_same_message_counts_once_beside_another_of_its_number() -> None:
     assert intake.rejected["odometry"] == 3
 
 
+def test_a_message_and_a_lie_in_its_name_each_count_once_whichever_came_first() -> None:
+    lie, true = arrival_of(1, 99.0), arrival_of(1, 1.0)
+    for first, second in ((lie, true), (true, lie)):
+        intake = Intake()
+        accepted(intake, [first, second, second, first, second])
+
+        (note,) = intake.notes()
+        assert note.startswith("1 messages contradict others")
+        assert intake.rejected["odometry"] == 3
+
+
 def test_of_any_number_of_lies_none_keeps_the_true_one_out() -> None:
     intake = Intake()
     lies = [arrival_of(1, 1.0 + number) for number in range(3 * MAX_UNLIKE)]
