@@ -26,16 +26,15 @@ MOVING_RAD_S = 0.05
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """The bytes of a genuine message, its envelope, and when it came, monotonic."""
+    """The bytes of a genuine message, and its envelope."""
 
     payload: bytes
     envelope: Envelope
-    time_s: float
 
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """A motor command that answers a view later than those before it: when it came, monotonic,
+    """A motor command that answers a view later than those before it: when it was sent, monotonic,
     whether it turns a wheel, and the reason where it halts them.
     """
 
@@ -46,7 +45,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A true pose: when it was received, monotonic, and when it was true."""
+    """A true pose: when it was sent, monotonic, and when it was true."""
 
     time_s: float
     pose: TruePose
@@ -57,6 +56,7 @@ class Listener:
     poses and reports of health. `is_forged` tells what an attacker has put; of the sources in
     `trusted` only that incarnation is genuine.
 
+    Times are those of sending: the process that puts a flood receives it too, and is late itself.
     `pump` it from one thread.
     """
 
@@ -70,13 +70,11 @@ class Listener:
         self.on_topic: Callable[[Topic], None] = lambda topic: None
         self.trusted: dict[str, int] = {}
         self._is_forged = is_forged
-        self._arrivals: SimpleQueue[tuple[float, Arrival]] = SimpleQueue()
+        self._arrivals: SimpleQueue[Arrival] = SimpleQueue()
+        self._monotonic_ahead_s = time.monotonic() - time.time()
         self._answered_ns = -1
         for topic in CARRIED:
-            bus.subscribe(topic, self._receive, lambda name, number: None)
-
-    def _receive(self, arrival: Arrival) -> None:
-        self._arrivals.put((time.monotonic(), arrival))
+            bus.subscribe(topic, self._arrivals.put, lambda name, number: None)
 
     def pump(self, timeout_s: float) -> None:
         """Take account of all that has come, waiting up to `timeout_s` for the first."""
@@ -84,10 +82,10 @@ class Listener:
         while True:
             left_s = until_s - time.monotonic()
             try:
-                time_s, arrival = self._arrivals.get(timeout=max(0.0, left_s))
+                arrival = self._arrivals.get(timeout=max(0.0, left_s))
             except Empty:
                 return
-            self._take(time_s, arrival)
+            self._take(arrival)
 
     def forget(self) -> None:
         """Forget all but the newest of what has come."""
@@ -97,7 +95,7 @@ class Listener:
         for reports in self.health.values():
             del reports[:-1]
 
-    def _take(self, time_s: float, arrival: Arrival) -> None:
+    def _take(self, arrival: Arrival) -> None:
         envelope = arrival.envelope
         if envelope is None or self._is_forged(envelope):
             return
@@ -107,7 +105,8 @@ class Listener:
 
         payload = bytes(arrival.payload)
         topic = arrival.topic
-        self.newest[topic] = Received(payload, envelope, time_s)
+        time_s = envelope.sent_ns * 1e-9 + self._monotonic_ahead_s
+        self.newest[topic] = Received(payload, envelope)
         self.incarnations[envelope.source] = envelope.incarnation
         try:
             self._note(topic, payload, time_s)
@@ -148,5 +147,5 @@ MAX_AHEAD_NS = 1_000_000_000
 
 
 def times_s(commands: Sequence[Command]) -> list[float]:
-    """Return when each came."""
+    """Return when each was sent."""
     return [command.time_s for command in commands]

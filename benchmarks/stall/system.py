@@ -62,14 +62,19 @@ class Program:
             raise CogmapError(f"{self.log.stem} has ended: {self.log.read_text()[-500:]}")
         os.kill(self._process.pid, number)
 
-    def end(self, how: signal.Signals = signal.SIGTERM) -> bytes:
-        """Ask it to end, and return what it printed. Raises CogmapError if it does not."""
-        self.send(how)
+    def end(self) -> bytes:
+        """Ask it to end, and return what it printed. Raises CogmapError if it fails."""
+        self.send(signal.SIGTERM)
         try:
             printed, _ = self._process.communicate(timeout=END_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             raise CogmapError(f"{self.log.stem} did not end within {END_S:g} s") from None
+
+        code = self._process.returncode
+        if code != 0:
+            said = self.log.read_text()[-500:]
+            raise CogmapError(f"{self.log.stem} ended with {code}: {said}")
         return printed
 
     def abandon(self) -> None:

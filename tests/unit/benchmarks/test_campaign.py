@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
 from benchmarks.campaign.listener import Listener
@@ -27,8 +29,8 @@ class System:
             MemoryBus(network), lambda envelope: envelope.incarnation == FORGED
         )
 
-    def publish(self, message: Message, incarnation: int = 1) -> None:
-        envelope = Envelope("someone", 0, incarnation, 0, 0)
+    def publish(self, message: Message, incarnation: int = 1, sent_ns: int = 0) -> None:
+        envelope = Envelope("someone", 0, incarnation, sent_ns, 0)
         self._bus.publish(topics.of(message), encode(message), envelope)
         self.listener.pump(0.0)
 
@@ -47,6 +49,16 @@ def system() -> System:
     pose = Pose(x_m=0.0, y_m=0.0, heading_rad=0.0)
     system.publish(TruePose(stamp_ns=VIEW_NS, pose=pose, travelled_m=0.0, progress=0.0))
     return system
+
+
+def test_a_command_is_of_when_it_was_sent_however_late_it_is_heard(system: System) -> None:
+    late_s = 3.0
+    answer = MotorCommand(stamp_ns=VIEW_NS, left_wheel_rad_s=1.0, right_wheel_rad_s=1.0)
+    sent_s = time.monotonic() - late_s
+    system.publish(answer, sent_ns=time.time_ns() - round(late_s * 1e9))
+
+    (command,) = system.listener.commands
+    assert command.time_s == pytest.approx(sent_s, abs=1.0)
 
 
 def test_only_commands_that_answer_a_later_view_are_progress(system: System) -> None:
