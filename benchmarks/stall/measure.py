@@ -17,9 +17,8 @@ from benchmarks.stall.witness import Stream, Witness
 from benchmarks.threshold import at_most
 from cogmap.cli.options import FiniteRange
 from cogmap.cli.progress import bar
-from cogmap.recording.completeness import sequence_of
+from cogmap.recording.completeness import NEVER_DROP, sequence_of
 from cogmap.recording.storage.reader import LogReader
-from cogmap.schemas import topics
 
 THRESHOLDS = {
     "gap_s": at_most(0.5),
@@ -126,7 +125,7 @@ def _stop(agent: Agent, witness: Witness, recorder: Recorder, stop_s: float, end
     continued_ns = time.time_ns()
     continued_s = time.monotonic()
     recorder.program.send(signal.SIGCONT)
-    while not _has_caught_up(recorder, at_end, continued_ns):
+    while not _has_caught_up(recorder, at_end, witness.numbers(), continued_ns):
         peak_mb = max(peak_mb, _peak_mb(agent, time.monotonic() + LOOK_S))
         if time.monotonic() > end_s:
             break
@@ -165,16 +164,23 @@ def _peak_mb(agent: Agent, until_s: float) -> float:
     return peak_mb
 
 
-def _has_caught_up(recorder: Recorder, until: dict[Stream, set[int]], since_ns: int) -> bool:
-    """Return whether the log has deltas that were published after those until then: it has them in
-    order, so that it has all before them that it will have.
+def _has_caught_up(
+    recorder: Recorder, until: dict[Stream, set[int]], now: dict[Stream, set[int]], since_ns: int
+) -> bool:
+    """Return whether the log has a message that was published after those `until` then of each
+    stream that has had one `now`. It has a stream in order, so it has all before that it will have.
     """
-    wanted = max(
-        (max(numbers) for (name, _, _), numbers in until.items() if name == topics.DELTA.name),
-        default=0,
-    )
-    records = LogReader(recorder.path).records({topics.DELTA}, start_ns=since_ns)
-    return any(record.sequence > wanted for record in records)
+    awaited = {
+        stream: max(numbers) for stream, numbers in until.items() if max(now[stream]) > max(numbers)
+    }
+    for record in LogReader(recorder.path).records(NEVER_DROP, start_ns=since_ns):
+        envelope = record.envelope
+        if envelope is None:
+            continue
+        stream = (record.topic_name, envelope.source, envelope.incarnation)
+        if envelope.seq > awaited.get(stream, envelope.seq):
+            del awaited[stream]
+    return not awaited
 
 
 def _lost(recorder: Recorder, expected: dict[Stream, set[int]]) -> Counter[str]:

@@ -30,8 +30,10 @@ log = logging.getLogger("cogmap")
 MODULE = "recorder"
 # How often it looks whether it is to stop.
 IDLE_S = 0.25
-# The most time that fetching may take when it ends, and the greatest number of a message.
+# The most time that fetching may take when it ends: what has come is to be written then, and who
+# started it waits ten seconds.
 LAST_FETCH_S = 3.0
+# The greatest number of a message.
 LAST_NUMBER = 2**63 - 1
 
 
@@ -133,6 +135,7 @@ class Recorder:
         self._after = after
         self._fetched: Counter[str] = Counter()
         self._fetched_to: dict[tuple[Topic, str], int] = {}
+        self._fetches_until_s = math.inf
         self._flush_timer = FlushTimer()
         self._sequences = SequenceTracker(now_ns, continues_ns)
         self._unrecovered: Counter[str] = Counter()
@@ -163,7 +166,7 @@ class Recorder:
             self._sequences.follow(topic, envelope)
             self._intake.resume(topic, envelope)
         if self._after:
-            self._queue.call(lambda: self._fetch_rest(math.inf))
+            self._queue.call(self._fetch_rest)
         for topic in self._topics:
             self._bus.subscribe(topic, self._queue.put, self.on_gap)
         self._bus.watch(self.on_member)
@@ -206,20 +209,24 @@ class Recorder:
         self._finish(writer)
         return writer.path
 
-    def close(self) -> Summary:
-        """Write what waits and what the bus has not delivered yet, leave the bus, and finish the
-        file. Raises LogError.
+    def close(self, fetch_s: float = LAST_FETCH_S) -> Summary:
+        """Write what waits and, in `fetch_s` at most, what the bus has not delivered yet, leave the
+        bus, and finish the file. What is not fetched by then is counted as lost. Raises LogError.
         """
-        end_s = time.monotonic() + LAST_FETCH_S
-        while time.monotonic() < end_s and self._take(0.0):
+        self._fetches_until_s = time.monotonic() + fetch_s
+        while self._may_fetch and self._take(0.0):
             pass
-        self._fetch_rest(end_s)
+        self._fetch_rest()
         self._bus.close()
         while self._take(0.0):
             pass
         if self._writer is None:
             return self._summary()
         return self._finish(self._writer)
+
+    @property
+    def _may_fetch(self) -> bool:
+        return time.monotonic() < self._fetches_until_s
 
     def _opened(self) -> LogWriter:
         """Begin a file: the first by the name that was given, others with a number."""
@@ -312,8 +319,11 @@ class Recorder:
 
         if self._was_fetched(item):
             return True
-        for missed in self._recovery.before(item):
-            self._accept_fetched(missed)
+        if self._may_fetch:
+            for missed in self._recovery.before(item):
+                self._accept_fetched(missed)
+                if not self._may_fetch:
+                    break
         self._accept(item)
         return True
 
@@ -339,12 +349,12 @@ class Recorder:
             return False
         return number <= self._fetched_to.get((arrival.topic, arrival.envelope.source), -1)
 
-    def _fetch_rest(self, end_s: float) -> None:
-        """Fetch what the known sources have published since their last message here, until `end_s`
-        at most: they may publish no other that would show it.
+    def _fetch_rest(self) -> None:
+        """Fetch what the known sources have published since their last message here: they may
+        publish no other that would show it.
         """
         for (topic, source), number in self._intake.received_up_to().items():
-            left_s = end_s - time.monotonic()
+            left_s = self._fetches_until_s - time.monotonic()
             if left_s <= 0.0:
                 return
             timeout_s = min(left_s, TIMEOUT_S)
@@ -354,7 +364,7 @@ class Recorder:
             for missed in rest:
                 self._accept_fetched(missed)
                 self._fetched_to[topic, source] = number_of(missed.envelope) or 0
-                if time.monotonic() > end_s:
+                if not self._may_fetch:
                     return
 
     def _store(self, arrival: Arrival) -> None:

@@ -184,6 +184,22 @@ def test_a_recorder_that_ends_fetches_what_the_bus_has_not_delivered(run: Run) -
     assert run.recorded() == [0, 1, 2, 3]
 
 
+def test_a_recorder_whose_time_to_end_is_over_fetches_no_more_and_says_what_it_lacks(
+    run: Run,
+) -> None:
+    recorder = run.record("log.mcap")
+    run.publish(2)
+    pump_all(recorder)
+    run.lose(3)
+    run.publish(1)
+
+    summary = recorder.close(fetch_s=0.0)
+
+    assert run.recorded() == [0, 1, 5]
+    assert summary.lost == {"odometry": 3}
+    assert not summary.fetched
+
+
 def test_the_first_messages_of_a_source_that_began_later_are_fetched(run: Run) -> None:
     recorder = run.record("log.mcap")
     run.lose(2)
