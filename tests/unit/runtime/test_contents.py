@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from cogmap.bus.codec import Envelope, encode
 from cogmap.bus.interface import Arrival
-from cogmap.runtime.delivery.contents import MAX_UNLIKE, REMEMBERED
+from cogmap.runtime.delivery.contents import MAX_UNLIKE, REMEMBERED, Contents
 from cogmap.runtime.delivery.intake import Intake
 from cogmap.schemas import topics
 from cogmap.schemas.sensing import Odometry
@@ -59,6 +59,15 @@ def test_a_message_and_a_lie_in_its_name_each_count_once_whichever_came_first() 
         (note,) = intake.notes()
         assert note.startswith("1 messages contradict others")
         assert intake.rejected["odometry"] == 3
+
+
+def test_numbers_that_are_far_apart_are_not_taken_for_one() -> None:
+    contents = Contents()
+    for apart in (2**61, 2**61 - 1, 2**62):
+        for seq in (1, 1 + apart):
+            envelope = Envelope("sim", seq, 1, 2, 3)
+            assert not contents.contradicts(envelope, str(seq).encode())
+            contents.add(envelope, str(seq).encode())
 
 
 def test_of_any_number_of_lies_none_keeps_the_true_one_out() -> None:
