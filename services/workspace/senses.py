@@ -11,6 +11,7 @@ import numpy as np
 from cogmap.errors import MessageError
 from cogmap.runtime.codelet import CycleContext
 from cogmap.runtime.run import Run
+from cogmap.schemas import topics
 from cogmap.schemas.array import Array
 from cogmap.schemas.base import Message
 from cogmap.schemas.nodes import ENERGY, Need, need_id
@@ -27,6 +28,7 @@ MAX_SCANS = 16
 MAX_ENERGIES = 16
 MAX_SCAN_AGE_NS = 100_000_000
 """In real time, how much older than its view a scan may be: half of the time between two views."""
+CLOCK_PERIOD_NS = round(1e9 / topics.CLOCK.rate_hz)
 SCANNERS = ("sim", "player", "sensory")
 """The modules that publish range scans: of percept-level sensing, and of cameras."""
 
@@ -128,8 +130,8 @@ class Scans:
             return True
         if self._is_lockstep:
             return False
-        # Without a clock, or without scans, there is nothing to wait for.
-        is_moment_of_view = 0 < now_ns <= stamp_ns
+        # A clock that lags further behind the views would have every one wait.
+        is_moment_of_view = stamp_ns - CLOCK_PERIOD_NS <= now_ns <= stamp_ns
         return not self._scans or not is_moment_of_view
 
     def take(self, stamp_ns: int) -> RangeScan | None:

@@ -13,7 +13,7 @@ from cogmap.runtime.run import REAL_TIME, Run
 from cogmap.schemas.array import Array
 from cogmap.schemas.codelets import Task
 from cogmap.schemas.sensing import RangeScan
-from cogmap.services.workspace.senses import MAX_SCAN_AGE_NS
+from cogmap.services.workspace.senses import CLOCK_PERIOD_NS, MAX_SCAN_AGE_NS
 from cogmap.testing import percepts, self_motion, stamp_ns
 from tests.support.world.scenes import Desk
 
@@ -155,6 +155,16 @@ def test_in_real_time_a_view_waits_for_its_scan_until_the_clock_has_passed(timel
     timely.work()
     assert _rays(timely, 1) is None
     assert timely.deltas[-1].cycle == 2
+
+
+def test_in_real_time_no_view_waits_for_a_clock_that_lags_behind_it(timely: Desk) -> None:
+    timely.feed(_scan(0))
+    _view(timely, 0)
+    for frame in (1, 2, 3):
+        timely.clock(stamp_ns(frame) - CLOCK_PERIOD_NS - 1)
+        _view(timely, frame)
+
+    assert timely.deltas[-1].cycle == 4
 
 
 def test_in_real_time_a_scan_that_is_too_old_is_not_used(timely: Desk) -> None:
