@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import faulthandler
 import logging
 import os
 import signal
@@ -35,6 +36,7 @@ RETURN_PERIOD_NS = 60_000_000_000
 PATIENT = 10
 # To end in order; whoever started it would wait as long.
 END_GRACE_S = 10.0
+STANDARD_ERROR = 2
 
 
 class Stop:
@@ -73,8 +75,8 @@ class Stop:
         # Not sys.stdin.read(): its lock would outlive the main thread.
         while os.read(sys.stdin.fileno(), 4096):
             pass
-        self._asked.set()
         _end_by_force()
+        self._asked.set()
 
 
 def await_line() -> bool:
@@ -164,8 +166,9 @@ def run_router(endpoint: str, stop: Stop, agent: str = "", ends_with: str = "") 
 
 def _end_by_force() -> None:
     """End this process after a while if something hangs, as closing a session may while others
-    leave it: nobody may be left to end it.
+    leave it: nobody may be left to end it. Where each of its threads hangs is written to standard
+    error.
+
+    No thread of Python's does it: a library that waits may keep all of them from running.
     """
-    timer = threading.Timer(END_GRACE_S, os._exit, [1])
-    timer.daemon = True
-    timer.start()
+    faulthandler.dump_traceback_later(END_GRACE_S, exit=True, file=STANDARD_ERROR)
