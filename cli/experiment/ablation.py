@@ -134,7 +134,7 @@ def _heading(domain: Domain) -> str:
 
 
 def _cell(name: str, domain: Domain, metrics: Metrics) -> str:
-    over = metrics[f"{name}_over_fused_mean"]
+    over = metrics.get(f"{name}_over_fused_mean")
     lost = metrics[f"{name}_lost"]
     text = _spread(f"{name}_{domain.quantity}_{domain.unit}", metrics)
     if over is not None:

@@ -7,7 +7,7 @@ from statistics import fmean, median, stdev
 
 import numpy as np
 
-from cogmap.experiments.ablation.measure import Domain, Measured
+from cogmap.experiments.ablation.measure import ERROR, Domain, Measured
 from cogmap.experiments.ablation.outcome import Outcome
 from cogmap.experiments.ablation.variants import OURS, VARIANTS
 
@@ -19,9 +19,10 @@ def ablation_metrics(domains: Sequence[Domain], measured: Measured) -> Metrics:
     """Return mean, SD and median of every cell, the runs that were lost, and ratios: of errors, or
     of what else a domain measures.
 
-    `..._over_fused` is of the same run's fused self-motion alone, `..._over_ours_...` of the run of
-    the same case by our rules. A cell is filled if each of its runs has a number or is counted as
-    lost; `..._without_number` counts those that ended early.
+    `..._over_fused` is of the same run's fused self-motion alone, where that has the errors that
+    are compared, `..._over_ours_...` of the run of the same case by our rules. A cell is filled if
+    each of its runs has a number or is counted as lost; `..._without_number` counts those that
+    ended early.
     """
     metrics: Metrics = {}
     filled = 0
@@ -43,9 +44,10 @@ def _cell(name: str, domain: Domain, outcomes: Sequence[Outcome]) -> Metrics:
     measured = f"{domain.quantity}_{domain.unit}"
     metrics: Metrics = {}
     metrics |= spread(f"{name}_{measured}", [each.error for each in outcomes])
-    metrics |= spread(f"{name}_fused_{measured}", [each.fused for each in outcomes])
-    metrics |= spread(f"{name}_wheels_{measured}", [each.wheels for each in outcomes])
-    metrics |= spread(f"{name}_over_fused", [each.over_fused for each in outcomes])
+    if domain.quantity == ERROR:
+        metrics |= spread(f"{name}_fused_{measured}", [each.fused for each in outcomes])
+        metrics |= spread(f"{name}_wheels_{measured}", [each.wheels for each in outcomes])
+        metrics |= spread(f"{name}_over_fused", [each.over_fused for each in outcomes])
 
     failures = [each.failure for each in outcomes if each.failure]
     metrics[f"{name}_runs"] = float(len(outcomes))

@@ -178,6 +178,15 @@ def test_a_cell_without_any_number_has_none_in_json() -> None:
     assert "NaN" not in json.dumps(metrics)
 
 
+def test_path_integration_has_no_cell_where_no_errors_are_measured() -> None:
+    errands = Domain("errands", "errands", "over", [Reckoned(1.0)], plans=True, quantity="way")
+
+    metrics = ablation_metrics([errands], measure([errands], 1, _quiet))
+
+    assert metrics["errands_ours_way_over_mean"] == 1
+    assert not any("fused" in name or "wheels" in name for name in metrics)
+
+
 def test_errors_are_compared_case_by_case() -> None:
     cases = [Reckoned(1.0), Reckoned(4.0)]
     domains = [Domain("town", "town", "m", cases, plans=True)]
