@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 
 from cogmap.geometry.arrays import Bytes
 from cogmap.services.memory.sparse.vectors import VALUES, bind, bundle, permuted
+
+# So many vectors are not drawn anew: a town's names are fewer, but each goal has one of its own.
+RECENT = 512
 
 
 class ItemMemory:
@@ -24,13 +28,10 @@ class ItemMemory:
         self.dimensions = dimensions
         self.values = values
         self._seed = seed
-        self._items: dict[str, Bytes] = {}
 
     def item(self, name: str) -> Bytes:
         """Return the vector of an item."""
-        if name not in self._items:
-            self._items[name] = self._drawn("item", name)
-        return self._items[name]
+        return self._drawn("item", name)
 
     def role(self, name: str) -> Bytes:
         """Return the vector of a role, which is unrelated to that of an item of the same name."""
@@ -41,10 +42,14 @@ class ItemMemory:
         return bind(self.role(role), self.item(name), self.values)
 
     def _drawn(self, kind: str, name: str) -> Bytes:
-        """Draw values from a hash: no version of a random generator changes what is stored."""
-        key = f"{self._seed} {kind} {name}".encode()
-        drawn = hashlib.shake_256(key).digest(self.dimensions)
-        return np.frombuffer(drawn, np.uint8) & np.uint8(self.values - 1)
+        return _drawn(f"{self._seed} {kind} {name}", self.dimensions, self.values)
+
+
+@lru_cache(maxsize=RECENT)
+def _drawn(key: str, dimensions: int, values: int) -> Bytes:
+    """Draw values from a hash: no version of a random generator changes what is stored."""
+    drawn = hashlib.shake_256(key.encode()).digest(dimensions)
+    return np.frombuffer(drawn, np.uint8) & np.uint8(values - 1)
 
 
 def encode_sequence(items: ItemMemory, names: Sequence[str]) -> Bytes:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,23 @@ def test_the_vector_of_a_name_never_changes() -> None:
     found = ItemMemory(1, 1024).item("church")
 
     assert found[:6].tolist() == [9, 13, 15, 7, 11, 14]
+
+
+def test_names_that_are_not_used_again_take_no_memory() -> None:
+    items = ItemMemory(1, 1024)
+    for number in range(1000):
+        items.item(f"goal {number}")
+
+    tracemalloc.start()
+    try:
+        for number in range(1000, 2000):
+            items.item(f"goal {number}")
+        grown_bytes, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+
+    # What replaces older ones is traced, and at most as much as all that is kept.
+    assert grown_bytes < 1000 * 1024
 
 
 def test_a_name_in_a_role_is_unrelated_to_the_name_and_to_other_roles(items: ItemMemory) -> None:
