@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import ctypes
+import threading
+import time
+from functools import cache
 
 # Twice what sensory memory frees with each frame; glibc takes no larger threshold of mmap.
 KEPT_BYTES = 32 * 2**20
 # Where threads of one process allocate at once. glibc would make eight for each processor.
 ARENAS = 2
+# Between two returns of freed memory, which the next arrays must get again.
+RETURN_PERIOD_S = 60.0
 # From glibc's malloc.h.
 _M_TRIM_THRESHOLD = -1
 _M_MMAP_THRESHOLD = -3
@@ -41,6 +46,20 @@ def return_freed_memory() -> None:
     trim = getattr(ctypes.CDLL(None), "malloc_trim", None)
     if trim is not None:
         trim(0)
+
+
+@cache
+def return_freed_memory_regularly() -> None:
+    """Return freed memory every RETURN_PERIOD_S from now on, on a thread of its own: nobody waits
+    for it.
+    """
+    threading.Thread(target=_return_regularly, daemon=True).start()
+
+
+def _return_regularly() -> None:
+    while True:
+        time.sleep(RETURN_PERIOD_S)
+        return_freed_memory()
 
 
 def _set(option: int, value: int) -> None:

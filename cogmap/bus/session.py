@@ -20,7 +20,7 @@ from cogmap.bus.access import handshake
 from cogmap.bus.access.others import everybody
 from cogmap.bus.access.rules import access_control
 from cogmap.errors import AccessError, NoRouterError, PortInUseError, UsageError
-from cogmap.heap import share_arenas
+from cogmap.heap import return_freed_memory_regularly, share_arenas
 from cogmap.schemas import topics
 from cogmap.schemas.topics import Delivery, Topic
 
@@ -245,6 +245,7 @@ def check_free(endpoint: str) -> None:
 def _open(mode: str, own: dict[str, object]) -> zenoh.Session:
     """Open a session with its `own` settings and those that all have."""
     share_arenas()
+    return_freed_memory_regularly()
     config = zenoh.Config()
     requests = [topic for topic in topics.ALL if topic.delivery is Delivery.ON_REQUEST]
     settings = own | {

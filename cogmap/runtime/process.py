@@ -14,7 +14,7 @@ from types import FrameType
 from cogmap.bus.access.subjects import ROUTER
 from cogmap.bus.session import EXPOSED, check_name, from_here, is_exposed, open_router
 from cogmap.bus.zenoh_bus import ZenohBus
-from cogmap.heap import keep_freed_memory, return_freed_memory
+from cogmap.heap import keep_freed_memory
 from cogmap.runtime import environment
 from cogmap.runtime.company import company_at, watch_company
 from cogmap.runtime.module import Module
@@ -25,13 +25,10 @@ from cogmap.runtime.state.outbox import Outbox
 from cogmap.runtime.state.published import PublishedCounts
 from cogmap.runtime.state.store import Store
 from cogmap.runtime.succession import is_single
-from cogmap.runtime.timers import Timers
 
 log = logging.getLogger("cogmap")
 # How often it looks whether it is asked to end.
 IDLE_S = 0.25
-RETURN_PERIOD_NS = 60_000_000_000
-"""Between two returns of freed memory, which the next arrays must get again."""
 # Added to the niceness, which ends at 19.
 PATIENT = 10
 # To end in order; whoever started it would wait as long.
@@ -139,10 +136,8 @@ def run_module(
         shell.open(is_single=is_single(module), is_asked_to_end=lambda: stop.asked)
         log.info("%s is ready", module.instance)
         is_alone = watch_company(bus, ends_with)
-        returning = Timers([(RETURN_PERIOD_NS, lambda now_ns: return_freed_memory())])
         while not stop.asked and not is_alone():
             shell.spin_once(IDLE_S)
-            returning.run_due()
     finally:
         shell.close()
 
