@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import signal
 import time
 from collections import Counter, defaultdict
 from contextlib import closing
 from dataclasses import dataclass
+from pathlib import Path
 
 import click
 
@@ -125,7 +127,8 @@ def _stop(agent: Agent, witness: Witness, recorder: Recorder, stop_s: float, end
     continued_ns = time.time_ns()
     continued_s = time.monotonic()
     recorder.program.send(signal.SIGCONT)
-    while not _has_caught_up(recorder, at_end, witness.numbers(), continued_ns):
+    awaited = last_of_those_that_grew(at_stop, at_end)
+    while not has_caught_up(recorder.path, awaited, continued_ns):
         peak_mb = max(peak_mb, _peak_mb(agent, time.monotonic() + LOOK_S))
         if time.monotonic() > end_s:
             break
@@ -164,23 +167,30 @@ def _peak_mb(agent: Agent, until_s: float) -> float:
     return peak_mb
 
 
-def _has_caught_up(
-    recorder: Recorder, until: dict[Stream, set[int]], now: dict[Stream, set[int]], since_ns: int
-) -> bool:
-    """Return whether the log has a message that was published after those `until` then of each
-    stream that has had one `now`. It has a stream in order, so it has all before that it will have.
+def last_of_those_that_grew(
+    before: dict[Stream, set[int]], after: dict[Stream, set[int]]
+) -> dict[Stream, int]:
+    """Return the last number of each stream that has had a message between two moments."""
+    last = {}
+    for stream, numbers in after.items():
+        if numbers - before.get(stream, set()):
+            last[stream] = max(numbers)
+    return last
+
+
+def has_caught_up(log: Path, awaited: dict[Stream, int], since_ns: int) -> bool:
+    """Return whether the log has the awaited number of each stream, or a later one. It has a stream
+    in order, so it has all before that it will have.
     """
-    awaited = {
-        stream: max(numbers) for stream, numbers in until.items() if max(now[stream]) > max(numbers)
-    }
-    for record in LogReader(recorder.path).records(NEVER_DROP, start_ns=since_ns):
+    left = dict(awaited)
+    for record in LogReader(log).records(NEVER_DROP, start_ns=since_ns):
         envelope = record.envelope
         if envelope is None:
             continue
         stream = (record.topic_name, envelope.source, envelope.incarnation)
-        if envelope.seq > awaited.get(stream, envelope.seq):
-            del awaited[stream]
-    return not awaited
+        if envelope.seq >= left.get(stream, math.inf):
+            del left[stream]
+    return not left
 
 
 def _lost(recorder: Recorder, expected: dict[Stream, set[int]]) -> Counter[str]:
