@@ -38,7 +38,9 @@ log = logging.getLogger("cogmap")
 # Zenoh delivers on a thread of its own, which at Python's default would wait 5 ms for a module that
 # computes.
 SWITCH_S = 5e-5
-RECOVERY_PERIOD = timedelta(seconds=0.5)
+# Each query asks again for all that has not come, whether the one before is answered or not: every
+# half second, they took so much of a link which halts at times that nothing else came through.
+RECOVERY_PERIOD = timedelta(seconds=2.0)
 # Zenoh answers from a cache on the thread that receives, with the cache locked: if it waited there
 # for a slow link, so would all that is published and received. The outbox has what is dropped.
 CACHE_REPLIES = ext.RepliesConfig(congestion_control=zenoh.CongestionControl.DROP)
