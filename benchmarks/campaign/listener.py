@@ -6,7 +6,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from queue import Empty, SimpleQueue
+from queue import Empty, Queue
 
 from cogmap.bus.codec import Envelope, decode
 from cogmap.bus.interface import Arrival, Bus
@@ -70,7 +70,7 @@ class Listener:
         self.on_topic: Callable[[Topic], None] = lambda topic: None
         self.trusted: dict[str, int] = {}
         self._is_forged = is_forged
-        self._arrivals: SimpleQueue[Arrival] = SimpleQueue()
+        self._arrivals: Queue[Arrival] = Queue()
         self._monotonic_ahead_s = time.monotonic() - time.time()
         self._answered_ns = -1
         for topic in CARRIED:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from queue import Empty, SimpleQueue
+from queue import Empty, Queue
 
 import zenoh
 
@@ -44,7 +44,7 @@ class Receptions:
         watched: Iterable[Topic],
         counts: Callable[[Arrival], bool] = lambda arrival: True,
     ) -> None:
-        self._queue: SimpleQueue[Arrival] = SimpleQueue()
+        self._queue: Queue[Arrival] = Queue()
         self._counts = counts
         for topic in watched:
             bus.subscribe(topic, self._queue.put, lambda name, number: None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import Counter
-from queue import Empty, SimpleQueue
+from queue import Empty, Queue
 
 from cogmap.bus.interface import Arrival, Job
 from cogmap.schemas.topics import Delivery
@@ -22,7 +22,9 @@ class Inbox:
 
     def __init__(self, *, keeps_all: bool = False) -> None:
         self._keeps_all = keeps_all
-        self._waiting: SimpleQueue[Arrival | Job | _Slot] = SimpleQueue()
+        # Not a SimpleQueue: where a wait of some microseconds is over before it has begun, that of
+        # CPython 3.11 waits for ever.
+        self._waiting: Queue[Arrival | Job | _Slot] = Queue()
         self._newest: dict[_Slot, Arrival] = {}
         self._replacing = threading.Lock()
         self.superseded: Counter[str] = Counter()
