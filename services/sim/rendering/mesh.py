@@ -181,7 +181,7 @@ def cuts(start: float, end: float, cell_m: float) -> list[float]:
 
 
 def _normal(a: Vertex, b: Vertex, c: Vertex) -> Vertex:
-    """Return the unit vector out of the front of a triangle.
+    """Return the unit vector out of the front of a triangle, zero of one without an area.
 
     In plain numbers, as NumPy takes ten times as long for three of them.
     """
@@ -190,7 +190,7 @@ def _normal(a: Vertex, b: Vertex, c: Vertex) -> Vertex:
     x = uy * vz - uz * vy
     y = uz * vx - ux * vz
     z = ux * vy - uy * vx
-    length = math.sqrt(x * x + y * y + z * z)
+    length = math.sqrt(x * x + y * y + z * z) or 1.0
     return x / length, y / length, z / length
 
 

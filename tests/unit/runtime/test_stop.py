@@ -26,7 +26,7 @@ def test_a_signal_asks_to_end_until_the_stop_is_released() -> None:
     "hang",
     [
         pytest.param("threading.Event().wait()", id="in-python"),
-        pytest.param("ctypes.PyDLL(None).sleep(60)", id="in-a-library-that-keeps-python-waiting"),
+        pytest.param("ctypes.PyDLL(None).pause()", id="in-a-library-that-keeps-python-waiting"),
     ],
 )
 def test_a_tied_process_that_hangs_ends_a_while_after_its_parent_and_says_where(hang: str) -> None:
