@@ -89,16 +89,17 @@ class Program:
 
 
 class Agent:
-    """A router, and an agent that explores a town in lockstep, at percept level, without end."""
+    """A router, and an agent that explores a town at percept level, without end."""
 
-    def __init__(self, folder: Path, seed: int) -> None:
+    def __init__(self, folder: Path, seed: int, is_lockstep: bool) -> None:
         self._folder = folder
         self.endpoint = free_endpoint()
         self._connect = ("--connect", self.endpoint, "--tied")
         self.router = Program(folder / "router.log", "router", *self._connect)
+        mode = "--lockstep" if is_lockstep else "--real-time"
         self._drive = Program(
             folder / "drive.log",
-            *("run", "--lockstep", "--no-record", "--json", "--tied"),
+            *("run", mode, "--no-record", "--json", "--tied"),
             *("--set", "sim.sensing=percepts", "--town", "blocks", "--seed", str(seed)),
             *("--explore", str(ENDLESS_S), "--time-limit", str(ENDLESS_S)),
             *("--out", str(folder / "run"), "--router", self.endpoint, "--agent", AGENT),
