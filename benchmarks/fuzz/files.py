@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import gc
 import logging
+import os
 import random
 import shutil
 import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks.fuzz.bombs import bombs
@@ -15,12 +18,24 @@ from benchmarks.fuzz.readers import Format, formats
 from benchmarks.fuzz.samples import Files
 from benchmarks.fuzz.watch import Findings, rss_mb
 
+TOLD_EVERY = 100
+STANDARD_ERROR = 2
 
-def campaign(seed: str, count: int, until_s: float, folder: Path) -> Findings:
+
+def campaign(
+    seed: str, count: int, until_s: float, tell: Callable[[int], None], folder: Path
+) -> Findings:
     """Read `count` mutated files, or as many as there is time for up to the monotonic `until_s`,
-    formats in turn, after every crafted file once.
+    formats in turn, after every crafted file once, and `tell` now and then how many more were read.
     """
     logging.disable(logging.CRITICAL)
+    with _standard_error_to(folder / "decoders.txt"):
+        return _read(seed, count, until_s, tell, folder)
+
+
+def _read(
+    seed: str, count: int, until_s: float, tell: Callable[[int], None], folder: Path
+) -> Findings:
     findings = Findings()
     rng = random.Random(f"files {seed}")
     table = [*formats().values()]
@@ -37,10 +52,25 @@ def campaign(seed: str, count: int, until_s: float, folder: Path) -> Findings:
             break
         form, files = wholes[number % len(wholes)]
         read(form, mutated(files, rng), folder, findings)
+        if (number + 1) % TOLD_EVERY == 0:
+            tell(TOLD_EVERY)
 
     gc.collect()
     findings.growth_mb = max(0.0, rss_mb() - baseline_mb)
     return findings
+
+
+@contextmanager
+def _standard_error_to(path: Path) -> Iterator[None]:
+    """Let decoders of pictures, which print a line for each error, print into a file."""
+    shown = os.dup(STANDARD_ERROR)
+    with path.open("wb") as file:
+        os.dup2(file.fileno(), STANDARD_ERROR)
+    try:
+        yield
+    finally:
+        os.dup2(shown, STANDARD_ERROR)
+        os.close(shown)
 
 
 def mutated(files: Files, rng: random.Random) -> Files:

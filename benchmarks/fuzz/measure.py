@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from queue import Empty, Queue
 
 import click
 
@@ -16,7 +17,8 @@ from benchmarks.fuzz import files, messages
 from benchmarks.fuzz.watch import Findings
 from benchmarks.report import Metrics
 from benchmarks.threshold import at_most
-from cogmap.parallel import exit_with
+from cogmap.cli.progress import bar
+from cogmap.parallel import Progress, exit_with
 
 THRESHOLDS = {
     "crashes": at_most(0),
@@ -50,6 +52,7 @@ OPTIONS = [
     PROCESSES,
 ]
 SHOWN = 20
+POLL_S = 0.5
 
 
 def measure(
@@ -70,21 +73,40 @@ def measure(
     """
     until_s = time.monotonic() + time_limit_s
     processes = setting.processes
-    with ProcessPoolExecutor(
-        processes, multiprocessing.get_context("spawn"), exit_with, (os.getpid(),)
-    ) as pool:
+    context = multiprocessing.get_context("spawn")
+    with (
+        context.Manager() as manager,
+        ProcessPoolExecutor(processes, context, exit_with, (os.getpid(),)) as pool,
+        bar("fuzzing") as progress,
+    ):
+        tried: Queue[int] = manager.Queue()
         pending: list[tuple[str, Future[Findings]]] = []
         for number, share in enumerate(shares(file_count, processes)):
             folder = setting.folder / f"files-{number}"
             folder.mkdir()
             own = f"{seed}/{number}"
-            pending.append(("files", pool.submit(files.campaign, own, share, until_s, folder)))
+            job = pool.submit(files.campaign, own, share, until_s, tried.put, folder)
+            pending.append(("files", job))
         for number, share in enumerate(shares(count, processes)):
             own = f"{seed}/{number}"
-            pending.append(("messages", pool.submit(messages.campaign, own, share, until_s)))
+            job = pool.submit(messages.campaign, own, share, until_s, tried.put)
+            pending.append(("messages", job))
+
+        _show(progress, tried, count + file_count, [job for _, job in pending])
         found, ended = gathered(pending, setting.announce)
 
     return metrics(found, ended)
+
+
+def _show(progress: Progress, tried: Queue[int], total: int, jobs: list[Future[Findings]]) -> None:
+    """Show how many of `total` mutations were tried, until all jobs have ended."""
+    done = 0
+    while not all(job.done() for job in jobs):
+        try:
+            done += tried.get(timeout=POLL_S)
+        except Empty:
+            continue
+        progress(done / total)
 
 
 def gathered(

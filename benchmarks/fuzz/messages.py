@@ -6,7 +6,7 @@ import gc
 import logging
 import random
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import msgspec
@@ -92,17 +92,22 @@ class Hail:
         return payload, envelope
 
 
-def campaign(seed: str, count: int, until_s: float) -> Findings:
-    """Throw `count` messages, or as many as there is time for up to the monotonic `until_s`."""
+def campaign(seed: str, count: int, until_s: float, tell: Callable[[int], None]) -> Findings:
+    """Throw `count` messages, or as many as there is time for up to the monotonic `until_s`, and
+    `tell` now and then how many more were thrown.
+    """
     findings = Findings()
     with _faults(findings):
-        return _thrown(findings, seed, count, until_s)
+        return _thrown(findings, seed, count, until_s, tell)
 
 
-def _thrown(findings: Findings, seed: str, count: int, until_s: float) -> Findings:
+def _thrown(
+    findings: Findings, seed: str, count: int, until_s: float, tell: Callable[[int], None]
+) -> Findings:
     hail = Hail(seed)
     baseline_mb = rss_mb()
     while findings.tried < count and time.monotonic() < until_s:
+        tried_before = findings.tried
         with modules() as runner:
             hail.begin(runner)
             for _ in range(min(ANEW_AFTER, count - findings.tried)):
@@ -113,6 +118,7 @@ def _thrown(findings: Findings, seed: str, count: int, until_s: float) -> Findin
                 findings.refused += sum(shell.intake.rejected.values())
                 findings.handled += sum(shell.intake.received.values())
         gc.collect()
+        tell(findings.tried - tried_before)
         if findings.tried <= WARM_UP:
             baseline_mb = rss_mb()
 

@@ -17,10 +17,12 @@ OF_EACH_FORMAT = 12
 
 
 def test_mutated_messages_end_no_module() -> None:
-    found = messages.campaign("short", MESSAGES, time.monotonic() + 600.0)
+    told: list[int] = []
+
+    found = messages.campaign("short", MESSAGES, time.monotonic() + 600.0, told.append)
 
     assert not found.crashes
-    assert found.tried == MESSAGES
+    assert found.tried == MESSAGES == sum(told)
     assert found.handled
     assert found.refused
 
