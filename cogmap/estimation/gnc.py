@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from cogmap.estimation.hypotheses import Hypotheses
-from cogmap.estimation.least_squares import optimize
+from cogmap.estimation.least_squares import NormalEquations, optimize
 from cogmap.estimation.pose_graph import PoseGraph, mahalanobis2, residuals
 from cogmap.geometry.arrays import Booleans
 
@@ -47,6 +47,7 @@ def inliers(graph: PoseGraph, false_closure: float) -> Booleans:
 
 def _by_weights(graph: PoseGraph, hypotheses: Hypotheses) -> Booleans:
     """Mark the closures that keep their weight, (m,)."""
+    normal = NormalEquations(len(graph.poses), graph.constraints)
     weights = np.ones(len(graph.closures))
     convexity = 0.0
 
@@ -54,7 +55,8 @@ def _by_weights(graph: PoseGraph, hypotheses: Hypotheses) -> Booleans:
         # Each closure's misfit of the path that so weighted ones lead to, over its threshold.
         closures = graph.closures
         weighted = graph.with_closures(closures.weighted(weights * hypotheses.shares))
-        residual = residuals(optimize(weighted, ITERATIONS_PER_ROUND), closures)
+        poses = optimize(weighted, ITERATIONS_PER_ROUND, normal)
+        residual = residuals(poses, closures)
         excess = mahalanobis2(residual, closures.information) / hypotheses.threshold
         if not convexity:
             worst = excess.max()

@@ -51,11 +51,11 @@ class IncrementalSolver:
         self._relinearize(graph)
 
     def _relinearize(self, graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> None:
-        poses = optimize(graph, max_iterations)
+        constraints = graph.constraints
+        self._normal = NormalEquations(len(graph.poses), constraints)
+        poses = optimize(graph, max_iterations, self._normal)
         self.graph = replace(graph, poses=poses)
 
-        constraints = graph.constraints
-        self._normal = NormalEquations(len(poses), constraints)
         matrix = self._normal.matrix(poses, constraints)
         self._factors = factor(matrix)
 

@@ -168,15 +168,21 @@ def factor(matrix: sparse.csc_matrix) -> SuperLU:
     return splu(matrix, **FACTORING)
 
 
-def optimize(graph: PoseGraph, max_iterations: int = MAX_ITERATIONS) -> Floats:
+def optimize(
+    graph: PoseGraph,
+    max_iterations: int = MAX_ITERATIONS,
+    normal: NormalEquations | None = None,
+) -> Floats:
     """Find poses (n, 3) at a minimum of eq. 7, headings included, near those of `graph`. The first
     pose stays.
 
-    After `max_iterations`, return the best so far.
+    After `max_iterations`, return the best so far. To analyse the sparsity is a quarter of the
+    work: `normal` are the normal equations of constraints between the same poses.
     """
     poses = graph.poses
     constraints = graph.constraints
-    normal = NormalEquations(len(poses), constraints)
+    if normal is None:
+        normal = NormalEquations(len(poses), constraints)
     damping = 0.0
     before = cost(poses, constraints)
 
