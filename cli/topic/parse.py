@@ -12,6 +12,7 @@ import yaml
 
 from cogmap.bus.codec import decode, encode
 from cogmap.errors import MessageError, UsageError
+from cogmap.files.yaml import parsed
 from cogmap.hints import did_you_mean
 from cogmap.schemas.array import DTYPES
 from cogmap.schemas.base import Message
@@ -58,8 +59,8 @@ def _read(text: str) -> Any:
     with contextlib.suppress(msgspec.DecodeError, RecursionError):
         return msgspec.json.decode(text)
     try:
-        return yaml.safe_load(text)
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        return parsed(text)
+    except (yaml.YAMLError, ValueError) as error:
         reason = " ".join(str(error).split())
         raise UsageError(f"{text!r} is neither JSON nor YAML: {reason}") from None
 

@@ -21,6 +21,7 @@ from cogmap.data.stereo_recording import StereoRecording, checked_stamps
 from cogmap.data.text import Line, cells_of, number_of, numbered_lines, read_bytes
 from cogmap.data.true_path import poses_at
 from cogmap.errors import UsageError
+from cogmap.files.yaml import parsed
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import transform_to
 
@@ -96,8 +97,8 @@ def _yaml(path: Path) -> dict[str, Any]:
         )
     lines = [line for line in text.splitlines() if not line.startswith("%YAML")]
     try:
-        read = yaml.safe_load("\n".join(lines))
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        read = parsed("\n".join(lines))
+    except (yaml.YAMLError, ValueError) as error:
         words = " ".join(str(error).split())
         raise UsageError(f"{path} is no YAML ({words}): give {GIVE}") from None
     return read if isinstance(read, dict) else {}
@@ -148,7 +149,8 @@ def _true_poses(root: Path, stamps_ns: Indices, on_body: Floats) -> Floats | Non
             rows.append([since_s, *map(float, cells[1:8])])
         except (ValueError, IndexError):
             raise line.wrong(TRUTH) from None
-        if len(rows[-1]) != 8 or not np.isfinite(rows[-1]).all():
+        is_complete = len(rows[-1]) == 8 and np.isfinite(rows[-1]).all()
+        if not is_complete or not any(rows[-1][4:]):
             raise line.wrong(TRUTH)
     if not rows:
         return None

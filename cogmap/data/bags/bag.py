@@ -33,6 +33,7 @@ class Bag:
         if not path.exists():
             raise UsageError(f"there is no file or folder {path}: give {GIVE}")
         unpacking.check_databases(path)
+        unpacking.check_metadata(path)
         with self._whole():
             self._reader = any_reader([path], default_typestore=store)
             self._reader.open()

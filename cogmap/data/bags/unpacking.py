@@ -1,4 +1,6 @@
-"""Bounds for the library of bags, which has none: on what it unpacks, and what SQLite may do."""
+"""Bounds for the library of bags, which has none: on what it unpacks, what SQLite may do, and how
+deep metadata are nested.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +16,7 @@ import zstandard
 from cogmap.errors import UsageError
 from cogmap.files.bounds import MIB, Budget, most_unpacked
 from cogmap.files.packed import bounded
+from cogmap.files.yaml import TOO_DEEP, is_too_deep
 
 MAX_WINDOW_BYTES = 128 * MIB
 FLOOR_BYTES = 128 * MIB
@@ -80,6 +83,13 @@ def check_databases(path: Path) -> None:
                         f"{file} has a {str(kind)[:20]} {str(name)[:60]!r}, which no bag has: "
                         "record it again, or copy its tables into a new file"
                     )
+
+
+def check_metadata(path: Path) -> None:
+    """Raise UsageError if the metadata of a bag of ROS 2 are nested too deep."""
+    file = path / "metadata.yaml"
+    if file.is_file() and is_too_deep(file.read_text(encoding="utf-8", errors="replace")):
+        raise UsageError(f"{file} is damaged ({TOO_DEEP}): make it anew by `ros2 bag reindex`")
 
 
 def _connected(file: Path) -> sqlite3.Connection:

@@ -139,6 +139,16 @@ def test_where_nobody_measured_there_is_no_truth(tmp_path: Path) -> None:
     assert np.isfinite(poses[:2]).all()
 
 
+def test_a_rotation_of_no_length_is_said_with_its_line(tmp_path: Path) -> None:
+    folder = _folder(tmp_path)
+    _truth(folder, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+    path = folder / "mav0" / "state_groundtruth_estimate0" / "data.csv"
+    path.write_text(path.read_text() + f"{FIRST_NS + 2 * PERIOD_NS},1.0,0.0,1.5,0,0,0,0\n")
+
+    with pytest.raises(UsageError, match="line 4"):
+        read_euroc(folder)
+
+
 def test_a_picture_without_a_partner_is_an_error_of_that_pair(tmp_path: Path) -> None:
     folder = _folder(tmp_path)
     rows = (folder / "mav0" / "cam1" / "data.csv").read_text().splitlines()
@@ -161,6 +171,7 @@ def _cam(folder: Path, number: int) -> Path:
     [
         (lambda folder: (_cam(folder, 0) / "sensor.yaml").unlink(), "has no sensor.yaml"),
         (lambda folder: (_cam(folder, 0) / "sensor.yaml").write_text("a: ["), "is no YAML"),
+        (lambda folder: (_cam(folder, 0) / "sensor.yaml").write_text("[" * 19_000), "nested"),
         (lambda folder: (_cam(folder, 0) / "sensor.yaml").write_text("a: 1"), "intrinsics must be"),
         (lambda folder: _sensor(_cam(folder, 0), model="fisheye"), "camera_model is 'fisheye'"),
         (lambda folder: _sensor(_cam(folder, 1), left_m=-0.11, width=32), "pictures are 64 x 48"),

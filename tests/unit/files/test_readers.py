@@ -171,3 +171,13 @@ def test_a_database_of_a_bag_with_a_view_is_refused(tmp_path: Path) -> None:
 
     with pytest.raises(UsageError, match="view 'messages'"):
         unpacking.check_databases(tmp_path)
+
+
+def test_metadata_of_a_bag_that_are_nested_without_end_are_refused(tmp_path: Path) -> None:
+    metadata = tmp_path / "metadata.yaml"
+    metadata.write_text("rosbag2_bagfile_information: {version: 9, files: [{path: a.mcap}]}\n")
+    unpacking.check_metadata(tmp_path)
+    metadata.write_text("custom_data: " + "[" * 20_000)
+
+    with pytest.raises(UsageError, match="nested more than 64 deep"):
+        unpacking.check_metadata(tmp_path)
