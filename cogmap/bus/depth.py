@@ -40,6 +40,7 @@ _FLOWS = {
     topics.ROUTE_REPLAY: Flow(0.2, 1000),
     topics.STORED: Flow(0.2, 105_000),
     topics.TRUE_TOWN: Flow(0.2, 14_000),
+    topics.MOTOR_PROGRAM: Flow(0.2, 300),
     topics.BEHAVIOURS: Flow(5.0, 1500),
     topics.ACTION: Flow(5.0, 1500),
 }
