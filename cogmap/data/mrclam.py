@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cogmap.data.text import numbered_lines, plain_or_packed, read_bytes
+from cogmap.data.text import numbered_lines, plain_or_packed
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats
 
@@ -130,11 +130,12 @@ def _table(folder: Path, name: str, columns: _Columns) -> Floats:
             f"{folder} has no {name}.dat: give the folder of an MRCLAM set, with every file in it"
         )
 
-    rows = _parsed(read_bytes(path, GIVE).decode("utf-8", "replace"))
+    lines = [*numbered_lines(path, GIVE)]
+    rows = _parsed("\n".join(line.text for line in lines))
     if not len(rows):
         raise UsageError(f"{path} has no line with {columns.expected}: give the whole file")
     if not columns.fit(rows):
-        for line in numbered_lines(path, GIVE):
+        for line in lines:
             content, _, _ = line.text.partition("#")
             if content.strip() and not columns.fit(_parsed(content)):
                 raise line.wrong(columns.expected)

@@ -28,6 +28,8 @@ def decoded(content: Bytes, name: str) -> Bytes | None:
         with warnings.catch_warnings(action="ignore"):
             head = Image.open(io.BytesIO(content.tobytes()), formats=FORMATS)
         width_px, height_px = head.size
+        # OpenCV makes room for as much as a chunk says that it has.
+        head.verify()
     except Image.DecompressionBombError:
         width_px = height_px = MAX_PIXELS
     except Exception:  # each of its readers raises what the nonsense in a file leads to

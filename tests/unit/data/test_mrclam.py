@@ -54,6 +54,16 @@ def test_files_packed_with_xz_are_read_as_they_are(tmp_path: Path) -> None:
     assert (robot.odometry == plain.odometry).all()
 
 
+def test_numbers_between_wide_spaces_of_latin_1_are_read(tmp_path: Path) -> None:
+    (plain,) = read(_folder(tmp_path)).robots
+    path = tmp_path / "Robot1_Odometry.dat"
+    path.write_bytes(path.read_bytes().replace(b" ", b"\xa0"))
+
+    (robot,) = read(tmp_path).robots
+
+    assert (robot.odometry == plain.odometry).all()
+
+
 @pytest.mark.parametrize(
     ("name", "text", "expected"),
     [

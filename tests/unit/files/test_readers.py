@@ -33,6 +33,22 @@ def test_a_picture_of_a_gigabyte_of_pixels_is_refused(tmp_path: Path) -> None:
         picture(path)
 
 
+def test_a_picture_of_a_chunk_of_four_gigabytes_never_reaches_the_decoder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = bytearray(cv2.imencode(".png", np.zeros((40, 60), np.uint8))[1].tobytes())
+    path = tmp_path / "a.png"
+    path.write_bytes(content)
+    assert picture(path).shape == (40, 60)
+
+    at = content.index(b"IDAT")
+    content[at - 4 : at] = b"\xff" * 4
+    path.write_bytes(content)
+    monkeypatch.setattr(cv2, "imdecode", lambda *arguments: pytest.fail("it makes room for all"))
+    with pytest.raises(UsageError, match=r"a\.png"):
+        picture(path)
+
+
 def test_a_grid_map_takes_the_rows_that_are_there(tmp_path: Path) -> None:
     path = tmp_path / "a.map"
     path.write_text("type octile\nheight 16384\nwidth 16384\nmap\n" + "." * 16384 + "\n")
