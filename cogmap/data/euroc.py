@@ -18,7 +18,14 @@ from scipy.spatial.transform import Rotation
 
 from cogmap.data.camera_pair import Camera, RectifiedRecording, rectified
 from cogmap.data.stereo_recording import StereoRecording, checked_stamps
-from cogmap.data.text import Line, cells_of, number_of, numbered_lines, read_bytes
+from cogmap.data.text import (
+    NS_PER_S,
+    Line,
+    cells_of,
+    number_of,
+    numbered_lines,
+    read_bytes,
+)
 from cogmap.data.true_path import poses_at
 from cogmap.errors import UsageError
 from cogmap.files.yaml import parsed
@@ -26,7 +33,6 @@ from cogmap.geometry.arrays import Floats, Indices
 from cogmap.geometry.se2 import transform_to
 
 GIVE = "the folder of a EuRoC sequence, with mav0 in it"
-NS_PER_S = 1_000_000_000
 MAX_YAML_CHARACTERS = 20_000
 TRUTH = "a stamp in ns, a position and a quaternion w, x, y, z"
 MOUNT_HEIGHT_M = 1.0

@@ -28,7 +28,7 @@ import msgspec
 import numpy as np
 
 from cogmap.data.stereo_recording import StereoRecording, checked_stamps, pair_size_px
-from cogmap.data.text import numbered_lines, read_bytes
+from cogmap.data.text import NS_PER_S, numbered_lines, read_bytes, time_ns_of
 from cogmap.errors import UsageError
 from cogmap.files.toml import parsed
 from cogmap.geometry.arrays import Indices
@@ -38,7 +38,6 @@ from cogmap.schemas.sensing import Calibration
 GIVE = "a folder with left, right and camera.toml"
 CAMERA = "camera.toml"
 SUFFIXES = (".png", ".jpg", ".jpeg", ".pgm", ".bmp", ".tif", ".tiff")
-NS_PER_S = 1_000_000_000
 
 Pixels = Annotated[float, msgspec.Meta(gt=0, le=1e5)]
 Distortion = tuple[Finite, Finite, Finite, Finite, Finite]
@@ -131,12 +130,7 @@ def _stamps_ns(folder: Path, pairs: int, rate_hz: float | None) -> Indices:
             )
         return np.rint(np.arange(pairs) * NS_PER_S / rate_hz).astype(np.int64)
 
-    times_ns = []
-    for line in numbered_lines(path, GIVE):
-        try:
-            times_ns.append(round(float(line.text) * NS_PER_S))
-        except (ValueError, OverflowError):
-            raise line.wrong("a time in seconds") from None
+    times_ns = [time_ns_of(line) for line in numbered_lines(path, GIVE)]
     if len(times_ns) != pairs:
         raise UsageError(
             f"{path} has {len(times_ns)} lines for {pairs} pairs of pictures: give one for each"

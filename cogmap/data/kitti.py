@@ -16,12 +16,11 @@ from typing import NamedTuple
 import numpy as np
 
 from cogmap.data.stereo_recording import StereoRecording, checked_stamps, pair_size_px
-from cogmap.data.text import Line, numbered_lines
+from cogmap.data.text import NS_PER_S, Line, number_of, numbered_lines, time_ns_of
 from cogmap.errors import UsageError
 from cogmap.geometry.arrays import Floats, Indices
 from cogmap.schemas.sensing import Calibration
 
-NS_PER_S = 1_000_000_000
 # The cameras of the car, in its published drawing: 1.65 m above the road, ten pairs a second.
 MOUNT_HEIGHT_M = 1.65
 INTERVAL_NS = NS_PER_S // 10
@@ -152,12 +151,13 @@ def _pictures(folder: Path, layout: _Layout) -> tuple[list[int], list[Path], lis
     names: dict[int, str] = {}
     for side in (layout.left, layout.right):
         for path in (folder / side).glob("*.png"):
-            if not path.stem.isdecimal():
+            number = number_of(path.stem)
+            if number is None:
                 raise UsageError(
                     f"{path}: the names of a KITTI sequence's pictures are numbers, such as "
                     "000000.png: rename it, or take it away"
                 )
-            names[int(path.stem)] = path.name
+            names[number] = path.name
 
     numbers = sorted(names)
     left = [folder / layout.left / names[number] for number in numbers]
@@ -170,12 +170,7 @@ def _stamps_ns(folder: Path, numbers: list[int]) -> Indices:
     if not path.is_file():
         return checked_stamps(np.array(numbers, np.int64) * INTERVAL_NS, folder)
 
-    times_ns = []
-    for line in numbered_lines(path, GIVE):
-        try:
-            times_ns.append(round(float(line.text) * NS_PER_S))
-        except (ValueError, OverflowError):
-            raise line.wrong("a time in seconds") from None
+    times_ns = [time_ns_of(line) for line in numbered_lines(path, GIVE)]
     _check_enough(path, len(times_ns), numbers)
     stamps_ns = np.array(times_ns, np.int64)[numbers]
     return checked_stamps(stamps_ns, path)

@@ -16,6 +16,7 @@ PACKED = SUFFIXES
 MAX_SHOWN = 60
 MAX_DIGITS = 30
 MAX_NUMBER = 1 << 63
+NS_PER_S = 1_000_000_000
 
 
 class Line(NamedTuple):
@@ -65,6 +66,19 @@ def number_of(word: str) -> int | None:
         return None
     number = int(word)
     return number if number < MAX_NUMBER else None
+
+
+def time_ns_of(line: Line) -> int:
+    """Return the time that a line states in seconds, in ns. Raises UsageError if it is none, or
+    takes more than 63 bits.
+    """
+    try:
+        time_ns = round(float(line.text) * NS_PER_S)
+    except (ValueError, OverflowError):
+        time_ns = MAX_NUMBER
+    if abs(time_ns) >= MAX_NUMBER:
+        raise line.wrong("a time in seconds")
+    return time_ns
 
 
 def read_bytes(path: Path, give: str) -> bytes:
