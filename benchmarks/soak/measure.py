@@ -158,7 +158,8 @@ class Soak:
             except CogmapError as error:
                 self._announce(f"the drive ended early, what it was is measured: {error}")
                 self._ended_early = True
-                self._run_s = at_s
+                # After its last command a drive draws its map, which takes memory.
+                self._run_s = self._cycles.at_s[-1] - self._began_s
                 return
 
             at_s = time.monotonic() - self._began_s
