@@ -50,7 +50,7 @@ OPTIONS = (
     ),
     click.Option(
         ["--lockstep/--real-time", "is_lockstep"],
-        default=False,
+        default=True,
         show_default=True,
         help="Drive as fast as it can, in lockstep, or in real time.",
     ),
@@ -92,7 +92,7 @@ def measure(
     *,
     stops_s: tuple[float, ...] = STOPS_S,
     seed: int = 1,
-    is_lockstep: bool = False,
+    is_lockstep: bool = True,
     time_limit_s: float = TIME_LIMIT_S,
 ) -> Metrics:
     """Stop a recorder of all that a running agent publishes, and let it continue.
@@ -102,8 +102,8 @@ def measure(
     `unsaid` those of them that its summary does not count, and `growth_mb` is how much the router's
     memory grew. The agent explores a town at percept level. Takes about eight minutes.
 
-    In lockstep more than twice as many messages are to be fetched, but a cycle waits until codelets
-    have corrected the map or planned a route: a gap may be theirs.
+    In lockstep more than twice as many messages are to be fetched as in real time. A cycle waits
+    there until codelets have corrected the map or planned a route: a gap may be theirs.
     """
     end_s = time.monotonic() + time_limit_s
     found: dict[float, Stop] = {}

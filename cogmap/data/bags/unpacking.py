@@ -13,6 +13,7 @@ from typing import IO, Any
 import lz4.frame
 import zstandard
 
+from cogmap.data.text import read_bytes
 from cogmap.errors import UsageError
 from cogmap.files.bounds import MIB, Budget, most_unpacked
 from cogmap.files.packed import bounded
@@ -86,9 +87,12 @@ def check_databases(path: Path) -> None:
 
 
 def check_metadata(path: Path) -> None:
-    """Raise UsageError if the metadata of a bag of ROS 2 are nested too deep."""
+    """Raise UsageError if the metadata of a bag of ROS 2 cannot be read, or are nested too deep."""
     file = path / "metadata.yaml"
-    if file.is_file() and is_too_deep(file.read_text(encoding="utf-8", errors="replace")):
+    if not file.is_file():
+        return
+    text = read_bytes(file, "a bag that you may read").decode("utf-8", "replace")
+    if is_too_deep(text):
         raise UsageError(f"{file} is damaged ({TOO_DEEP}): make it anew by `ros2 bag reindex`")
 
 
